@@ -1,13 +1,13 @@
 //! Roadmaps of robots among what rests around them: made before queries, saved, and used by plans.
 
-use regrasp_arms::plan::{build_graph, graph_differs, plan_with_graph};
+use regrasp_arms::plan::{GraphAnswer, build_graph, graph_differs, grow_graph, plan_with_graph};
 use regrasp_arms::roadmap::{BuildSettings, Roads, SuperGraph};
 use regrasp_base::{Budget, Diagnostic, InputError, Place, files};
 use regrasp_grasp::GraspList;
 use regrasp_plan::RobotPlan;
 use regrasp_planners::{Failure, FailureKind, PlannerSettings};
 use regrasp_scene::{Query, Scene, State};
-use regrasp_tasks::{RoadmapBuildSettings, TaskRoadmap, build_roadmap, plan_with_roadmap};
+use regrasp_tasks::{RoadmapBuildSettings, TaskAnswer, TaskRoadmap, build_roadmap, plan_with_roadmap};
 use std::path::Path;
 
 /// A roadmap of a robot.
@@ -17,6 +17,33 @@ pub enum RobotRoadmap {
     Motion(Box<Roads>),
     /// For pick and place: the super graph, double grasps, exchanges.
     Task(Box<TaskRoadmap>),
+}
+
+/// What was planned with a roadmap; the roadmap can grow by it ([`RobotRoadmap::grown_by`]).
+#[derive(Debug, Clone)]
+pub enum RobotAnswer {
+    /// Of a motion.
+    Motion(Box<GraphAnswer>),
+    /// Of pick and place.
+    Task(Box<TaskAnswer>),
+}
+
+impl RobotAnswer {
+    /// The plan.
+    pub fn plan(&self) -> &RobotPlan {
+        match self {
+            RobotAnswer::Motion(answer) => &answer.plan,
+            RobotAnswer::Task(answer) => &answer.plan,
+        }
+    }
+
+    /// The plan alone.
+    pub fn into_plan(self) -> RobotPlan {
+        match self {
+            RobotAnswer::Motion(answer) => answer.plan,
+            RobotAnswer::Task(answer) => answer.plan,
+        }
+    }
 }
 
 /// Where a roadmap is used: scene, state, query, and the lists of grasps of a task of pick and place.
@@ -129,11 +156,12 @@ impl RobotRoadmap {
         settings: &PlannerSettings,
         seed: u64,
         budget: &Budget,
-    ) -> Result<RobotPlan, Failure> {
+    ) -> Result<RobotAnswer, Failure> {
         let around = (asked.scene, asked.state);
         match (self, asked.query) {
             (RobotRoadmap::Task(roadmap), Query::PickAndPlace(query)) => {
                 plan_with_roadmap(around, query, asked.lists, &settings.task, (seed, budget), Some(roadmap))
+                    .map(|answer| RobotAnswer::Task(Box::new(answer)))
             }
             (RobotRoadmap::Motion(roads), Query::Motion(query)) => {
                 if let Some(what) = graph_differs(around, query, &roads.graph) {
@@ -141,6 +169,7 @@ impl RobotRoadmap {
                     return Err(Failure::bare(FailureKind::SettingsInvalid, message, "build the roadmap again"));
                 }
                 plan_with_graph(around, query, &settings.motion, (seed, budget), roads)
+                    .map(|answer| RobotAnswer::Motion(Box::new(answer)))
             }
             _ => {
                 let message = "the roadmap is of another kind of task".to_owned();
@@ -149,18 +178,59 @@ impl RobotRoadmap {
         }
     }
 
+    /// The roadmap with what an answer has and it has not. None where it had all that the answer needed. `asked` and `settings` are
+    /// those of the answer.
+    ///
+    /// Errors: as planning before any search; an answer of another kind of task.
+    pub fn grown_by(
+        &self,
+        asked: &Asked,
+        settings: &PlannerSettings,
+        answer: &RobotAnswer,
+    ) -> Result<Option<RobotRoadmap>, Failure> {
+        let around = (asked.scene, asked.state);
+        let grown = match (self, asked.query, answer) {
+            (RobotRoadmap::Task(roadmap), Query::PickAndPlace(query), RobotAnswer::Task(answer)) => {
+                let grown = roadmap.grown_by(around, query, asked.lists, &settings.task, answer)?;
+                RobotRoadmap::Task(Box::new(grown))
+            }
+            (RobotRoadmap::Motion(roads), Query::Motion(query), RobotAnswer::Motion(answer)) => {
+                let (grown, _) = grow_graph(around, query, roads, answer.new_way.as_slice());
+                RobotRoadmap::Motion(Box::new(grown))
+            }
+            _ => {
+                let message = "roadmap, query and answer are not of the same kind of task".to_owned();
+                return Err(Failure::bare(FailureKind::SettingsInvalid, message, "build the roadmap again"));
+            }
+        };
+        Ok((grown.sizes() != self.sizes()).then_some(grown))
+    }
+
+    /// Nodes, edges, double grasps, exchanges.
+    fn sizes(&self) -> [usize; 4] {
+        let of_graph = |roads: &Roads| [roads.graph.graph.nodes.len(), roads.graph.graph.edges.len()];
+        match self {
+            RobotRoadmap::Motion(roads) => {
+                let [nodes, edges] = of_graph(roads);
+                [nodes, edges, 0, 0]
+            }
+            RobotRoadmap::Task(roadmap) => {
+                let [nodes, edges] = roadmap.roads.as_ref().map_or([0, 0], of_graph);
+                let n_pairs = roadmap.double_grasps.iter().map(|of| of.pairs.len()).sum();
+                [nodes, edges, n_pairs, roadmap.n_exchanges()]
+            }
+        }
+    }
+
     /// What the roadmap holds, in words.
     pub fn in_words(&self) -> String {
-        let graph = |roads: &Roads| {
-            let graph = &roads.graph.graph;
-            format!("{} nodes, {} edges", graph.nodes.len(), graph.edges.len())
-        };
+        let [nodes, edges, n_pairs, exchanges] = self.sizes();
+        let graph = format!("{nodes} nodes, {edges} edges");
         match self {
-            RobotRoadmap::Motion(roads) => graph(roads),
+            RobotRoadmap::Motion(_) => graph,
             RobotRoadmap::Task(roadmap) => {
-                let n_pairs: usize = roadmap.double_grasps.iter().map(|of| of.pairs.len()).sum();
-                let graph = roadmap.roads.as_ref().map_or_else(|| "no graph".to_owned(), graph);
-                format!("{graph}, {n_pairs} double grasps, {} exchanges", roadmap.n_exchanges())
+                let graph = if roadmap.roads.is_some() { graph } else { "no graph".to_owned() };
+                format!("{graph}, {n_pairs} double grasps, {exchanges} exchanges")
             }
         }
     }

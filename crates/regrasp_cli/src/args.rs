@@ -175,6 +175,9 @@ pub struct Plan {
     /// Roadmap of the scene's robot, of `regrasp roadmap build` [default: SCENE.roadmap.json where it lies beside the scene]
     #[arg(long, value_name = "FILE.json")]
     pub roadmap: Option<PathBuf>,
+    /// Add to the roadmap of the robot what the plan has and the roadmap has not, and save it
+    #[arg(long)]
+    pub grow: bool,
     /// How to search.
     #[command(flatten)]
     pub search: Search,

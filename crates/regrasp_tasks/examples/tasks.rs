@@ -70,7 +70,8 @@ fn main() {
                 let seconds = before.elapsed().as_secs_f64();
                 times.push(seconds);
                 match found {
-                    Ok(plan) => {
+                    Ok(answer) => {
+                        let plan = answer.plan;
                         n_solved += 1;
                         durations.push(plan.duration());
                         let plan = regrasp_plan::AnyPlan::Robot(Box::new(plan));

@@ -7,9 +7,9 @@ use crate::exchange::{Give, Places, is_double_grasp};
 use crate::failing::{Stage, Tally};
 use crate::forces;
 use crate::in_hand::{self, Change};
-use crate::motions::{self, Step, Stuck};
+use crate::motions::{self, Made, Step, Stuck};
 use crate::placements::{Place, intermediate};
-use crate::roadmap::TaskRoadmap;
+use crate::roadmap::{TaskAnswer, TaskRoadmap};
 use crate::station::{Effort, HAND_COLLIDES, Station, may_hold, station};
 use regrasp_geometry::Vector;
 use regrasp_manipulation::failure::{Failure, FailureKind};
@@ -137,8 +137,8 @@ struct Graph<'c, 'a> {
     n_looked: usize,
 }
 
-/// The cheapest plan that holds what it promises.
-pub fn search(context: &Context, roadmap: Option<&TaskRoadmap>, tally: &mut Tally) -> Result<RobotPlan, Failure> {
+/// The cheapest plan that holds what it promises, and what the roadmap did not have.
+pub fn search(context: &Context, roadmap: Option<&TaskRoadmap>, tally: &mut Tally) -> Result<TaskAnswer, Failure> {
     let mut graph = Graph::new(context, roadmap);
     let roads = roadmap.and_then(|roadmap| roadmap.roads.as_ref());
     let mut attempt = 0;
@@ -156,7 +156,7 @@ pub fn search(context: &Context, roadmap: Option<&TaskRoadmap>, tally: &mut Tall
         let steps = graph.steps(&path);
         attempt += 1;
         match motions::segments(context, &steps, (attempt, roads), tally) {
-            Ok(segments) => {
+            Ok(Made { segments, new_ways }) => {
                 for stage in [Stage::Transit, Stage::Carry] {
                     tally.count(stage, Ok(()));
                 }
@@ -171,7 +171,11 @@ pub fn search(context: &Context, roadmap: Option<&TaskRoadmap>, tally: &mut Tall
                     steps.iter().filter_map(|step| if let Step::Change(own) = step { Some(*own) } else { None });
                 plan.promises.in_hand = in_hand::promises(context, changes);
                 plan.segments = segments;
-                return Ok(plan);
+                let exchanges = steps
+                    .iter()
+                    .filter_map(|step| if let Step::Give(give) = step { Some((*give).clone()) } else { None })
+                    .collect();
+                return Ok(TaskAnswer { plan, new_ways, exchanges });
             }
             Err(Stuck { stage, step, reason, interrupt }) => {
                 tally.count(stage, Err(&reason));

@@ -38,7 +38,7 @@ mod timing;
 pub use regrasp_manipulation::failure::{Cause, Failure, FailureKind};
 pub use regrasp_manipulation::task_settings::{TaskCost, TaskSettings};
 
-pub use roadmap::{RoadmapBuildSettings, TaskRoadmap, build_roadmap};
+pub use roadmap::{RoadmapBuildSettings, TaskAnswer, TaskRoadmap, build_roadmap};
 
 use context::{Context, Prepared};
 use failing::Tally;
@@ -59,10 +59,11 @@ pub fn plan_pick_and_place(
     seed: u64,
     budget: &Budget,
 ) -> Result<RobotPlan, Failure> {
-    plan_with_roadmap((scene, state), query, lists, settings, (seed, budget), None)
+    plan_with_roadmap((scene, state), query, lists, settings, (seed, budget), None).map(|answer| answer.plan)
 }
 
-/// As [`plan_pick_and_place`], with what was made before for this robot, what rests around it, and these lists.
+/// As [`plan_pick_and_place`], with what was made before for this robot, what rests around it, and these lists. What the answer has
+/// and the roadmap has not can be made part of it ([`TaskRoadmap::grown_by`]).
 ///
 /// Errors: as that, and a roadmap that was made for something else.
 pub fn plan_with_roadmap(
@@ -72,7 +73,7 @@ pub fn plan_with_roadmap(
     settings: &TaskSettings,
     (seed, budget): (u64, &Budget),
     roadmap: Option<&TaskRoadmap>,
-) -> Result<RobotPlan, Failure> {
+) -> Result<TaskAnswer, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     let prepared = Prepared::new(scene, query, lists, settings)?;
     let models = prepared.models();

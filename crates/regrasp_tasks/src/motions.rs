@@ -60,17 +60,26 @@ const FIRST_SAMPLES: u64 = 1000;
 /// Why a motion with the object has no forces.
 const TOO_FAST: &str = "motions without forces that hold the object";
 
+/// The motions of a plan.
+pub struct Made {
+    /// Its segments.
+    pub segments: Vec<RobotSegment>,
+    /// States at the corners of paths that the graph of the arms did not have.
+    pub new_ways: Vec<Vec<Vec<f64>>>,
+}
+
 /// Makes the segments of the steps. `attempt` tells searches for motions apart; `roads` is the graph of the arms, where one is known.
 pub fn segments(
     context: &Context,
     steps: &[Step],
     (attempt, roads): (u64, Option<&Roads>),
     tally: &mut Tally,
-) -> Result<Vec<RobotSegment>, Stuck> {
+) -> Result<Made, Stuck> {
     let mut maker = Maker {
         context,
         attempt,
         roads,
+        new_ways: Vec::new(),
         record: Record::default(),
         state: context.query.start.clone(),
         object: context.query.world_from_object_start,
@@ -89,7 +98,7 @@ pub fn segments(
     }
     maker.step = steps.len();
     maker.end(tally)?;
-    Ok(maker.record.segments)
+    Ok(Made { segments: maker.record.segments, new_ways: maker.new_ways })
 }
 
 /// Where the robot and the object are.
@@ -98,6 +107,8 @@ struct Maker<'c, 'a> {
     attempt: u64,
     /// The graph of the arms among what rests.
     roads: Option<&'c Roads>,
+    /// Paths that it did not have.
+    new_ways: Vec<Vec<Vec<f64>>>,
     record: Record,
     state: Vec<f64>,
     object: Pose,
@@ -177,7 +188,7 @@ impl<'c, 'a> Maker<'c, 'a> {
 
     /// A planned motion; none where the ends are the same.
     fn leg(
-        &self,
+        &mut self,
         [from, to]: [&[f64]; 2],
         world: &Arc<World>,
         carried: Option<&Carried>,
@@ -212,6 +223,7 @@ impl<'c, 'a> Maker<'c, 'a> {
         match plan_leg(&problem, &[to.to_vec()], times, &settings, (seed, &budget)) {
             Ok(leg) => {
                 tally.take(&leg.statistics);
+                self.new_ways.extend(leg.is_new.then(|| leg.corners.clone()));
                 Ok(Some(leg))
             }
             Err(failure) => {

@@ -37,6 +37,21 @@ pub fn graph_differs(around: (&Scene, &State), query: &MotionQuery, graph: &Supe
     (graph.world != fingerprint_of_world(&problem.world)).then_some("what rests around the robot")
 }
 
+/// The graph with ways that queries found, and the number of nodes that they added. `ways` has states of the robot; motions between
+/// them are straight. The query says for which robot, among what, the graph was made.
+pub fn grow_graph(
+    around: (&Scene, &State),
+    query: &MotionQuery,
+    roads: &Roads,
+    ways: &[Vec<Vec<f64>>],
+) -> (Roads, usize) {
+    let problem = Problem::new(around, query);
+    let model = model(&problem);
+    let of_model = |way: &Vec<Vec<f64>>| way.iter().map(|state| model.configuration_of(state)).collect();
+    let ways: Vec<Vec<Vec<f64>>> = ways.iter().map(of_model).collect();
+    roads.grown_by(&ways, &model, &problem.world)
+}
+
 impl<'a> Problem<'a> {
     /// Lets searches use a graph of the robot; `unknown` has what rests and the graph does not know.
     pub fn use_graph(&mut self, roads: &'a Roads, unknown: World) {

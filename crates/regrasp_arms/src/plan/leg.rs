@@ -21,6 +21,8 @@ pub struct Leg {
     pub timed: Option<TimedPath>,
     /// Counts of the search.
     pub statistics: RobotStatistics,
+    /// True where a graph was asked first and had no way.
+    pub is_new: bool,
 }
 
 /// Whether a leg gets times.
@@ -50,12 +52,14 @@ pub fn plan_leg(
         let settings = &MotionSettings { max_samples: settings.max_samples.min(few), ..settings.clone() };
         let found = find(problem, &model, goals, settings, (seed, budget)).and_then(|found| {
             let corners = found.path.iter().map(|corner| model.state_at(corner)).collect();
+            let is_new = found.is_new;
             match times {
-                LegTimes::Callers => Ok(Leg { corners, timed: None, statistics: found.statistics }),
+                LegTimes::Callers => Ok(Leg { corners, timed: None, statistics: found.statistics, is_new }),
                 LegTimes::Fastest => execute(problem, &model, found, settings).map(|executed| Leg {
                     corners,
                     timed: Some(of_states(&model, &executed.timed)),
                     statistics: executed.statistics,
+                    is_new,
                 }),
             }
         });

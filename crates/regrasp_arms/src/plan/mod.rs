@@ -21,7 +21,7 @@ use crate::roadmap::Roads;
 use crate::world::World;
 use execute::execute;
 pub use execute::limits;
-pub use graph::{build_graph, graph_differs};
+pub use graph::{build_graph, graph_differs, grow_graph};
 use problem::Problem;
 use regrasp_base::Budget;
 use regrasp_manipulation::failure::{Failure, FailureKind};
@@ -71,10 +71,21 @@ pub fn plan_in_stages(
     budget: &Budget,
     watch: &mut dyn FnMut(Stage),
 ) -> Result<RobotPlan, Failure> {
-    plan_problem(Problem::new((scene, state), query), settings, (seed, budget), watch)
+    plan_problem(Problem::new((scene, state), query), settings, (seed, budget), watch).map(|answer| answer.plan)
 }
 
-/// As [`plan_motion`], with a graph of the robot among what rests (`build_graph`).
+/// A plan, and what the graph that was asked did not have.
+#[derive(Debug, Clone)]
+pub struct GraphAnswer {
+    /// The plan.
+    pub plan: RobotPlan,
+    /// States of the robot at the corners of its path, where the graph had no way between start and goal. Motions between corners are
+    /// straight and free.
+    pub new_way: Option<Vec<Vec<f64>>>,
+}
+
+/// As [`plan_motion`], with a graph of the robot among what rests (`build_graph`). What the answer has and the graph has not can be
+/// made part of it ([`grow_graph`]).
 ///
 /// Errors: as [`plan_motion`].
 pub fn plan_with_graph(
@@ -83,7 +94,7 @@ pub fn plan_with_graph(
     settings: &MotionSettings,
     (seed, budget): (u64, &Budget),
     roads: &Roads,
-) -> Result<RobotPlan, Failure> {
+) -> Result<GraphAnswer, Failure> {
     let mut problem = Problem::new(around, query);
     problem.use_graph(roads, World::default());
     plan_problem(problem, settings, (seed, budget), &mut |_| {})
@@ -94,7 +105,7 @@ fn plan_problem(
     settings: &MotionSettings,
     (seed, budget): (u64, &Budget),
     watch: &mut dyn FnMut(Stage),
-) -> Result<RobotPlan, Failure> {
+) -> Result<GraphAnswer, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     let query = problem.query;
     problem.refuse_start(settings)?;
@@ -106,13 +117,15 @@ fn plan_problem(
         // A few joints may not be able to do it at all: the search among all of them gets the samples.
         let few = if index + 1 < groups.len() { FEW_SAMPLES } else { u64::MAX };
         let settings = &MotionSettings { max_samples: settings.max_samples.min(few), ..settings.clone() };
-        let found =
-            path::find(&problem, &model, (&query.start, &goals, settings.max_samples), settings, (seed, budget), watch)
-                .and_then(|path| execute(&problem, &model, path, settings));
+        let ends = (query.start.as_slice(), goals.as_slice(), settings.max_samples);
+        let found = path::find(&problem, &model, ends, settings, (seed, budget), watch).and_then(|found| {
+            let new_way = found.is_new.then(|| found.path.iter().map(|corner| model.state_at(corner)).collect());
+            execute(&problem, &model, found, settings).map(|executed| (executed, new_way))
+        });
         match found {
-            Ok(executed) => {
+            Ok((executed, new_way)) => {
                 watch(Stage::Timed);
-                return Ok(problem.record(&model, executed, settings, seed));
+                return Ok(GraphAnswer { plan: problem.record(&model, executed, settings, seed), new_way });
             }
             // More joints do not make an end valid.
             Err(failure) if failure.kind != FailureKind::WorkSpent => return Err(failure),

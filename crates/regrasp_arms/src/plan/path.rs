@@ -25,6 +25,8 @@ const GRAPH_NEIGHBOURS: usize = 30;
 pub struct Found {
     pub path: Vec<Vec<f64>>,
     pub statistics: RobotStatistics,
+    /// True where a graph was asked first and had no way.
+    pub is_new: bool,
 }
 
 /// Finds a path from `start` to one of `goals` (states). Where samples lead nowhere for want of room, at most `certified_samples` are
@@ -54,7 +56,7 @@ pub fn find(
     watch(Stage::Prepared);
     let world = Arc::clone(&problem.world);
     let statistics = RobotStatistics::default();
-    let mut search = Search { model, world, start, goals: free_goals, settings, statistics };
+    let mut search = Search { model, world, start, goals: free_goals, settings, statistics, is_new: false };
     let (mut interrupt, mut is_hopeless) = (None, false);
     // With room to certify, then without, then with certified motions only.
     let certified = settings.validation == Validation::Certified;
@@ -84,12 +86,12 @@ pub fn find(
         search.count(&collider);
         watch(Stage::Simplified);
         if !certified {
-            return Ok(Found { path, statistics: search.statistics });
+            return Ok(search.found(path));
         }
         let certified = search.certified(problem, path, &mut rng, budget);
         watch(Stage::Certified);
         if let Some(path) = certified {
-            return Ok(Found { path, statistics: search.statistics });
+            return Ok(search.found(path));
         }
     }
     // What samples do not find, certified motions do not either.
@@ -98,7 +100,7 @@ pub fn find(
         let certified = search.certified_from_nothing(problem, certified_samples, &mut rng, budget);
         watch(Stage::Searched);
         if let Some(path) = certified {
-            return Ok(Found { path, statistics: search.statistics });
+            return Ok(search.found(path));
         }
     }
     let kind = interrupt.map_or(FailureKind::WorkSpent, FailureKind::from);
@@ -113,9 +115,15 @@ struct Search<'m, 's> {
     goals: Vec<Vec<f64>>,
     settings: &'s MotionSettings,
     statistics: RobotStatistics,
+    /// True where the graph had no way when it was asked last.
+    is_new: bool,
 }
 
 impl Search<'_, '_> {
+    fn found(self, path: Vec<Vec<f64>>) -> Found {
+        Found { path, statistics: self.statistics, is_new: self.is_new }
+    }
+
     fn count(&mut self, collider: &Collider) {
         self.statistics.work += 8 * collider.counts.blocks + collider.counts.exact;
     }
@@ -148,6 +156,7 @@ impl Search<'_, '_> {
                         let mut outcome = in_turn(collider, &self.start, goal, &easy, rng, budget);
                         if outcome.path.is_none() && outcome.interrupt.is_none() {
                             outcome.path = self.by_graph(known, collider.settings, goal);
+                            self.is_new = outcome.path.is_none();
                         }
                         if outcome.path.is_none() && outcome.interrupt.is_none() {
                             self.take(&outcome);

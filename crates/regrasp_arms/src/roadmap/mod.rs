@@ -7,6 +7,8 @@
 
 /// Files of graphs.
 mod file;
+/// Graphs that grow.
+mod grow;
 /// The roadmap of one arm.
 mod one_arm;
 /// Queries.

@@ -168,7 +168,8 @@ pub fn query(
         if let Some(path) = &found.path
             && !(0..model.bodies.len()).any(changes.is_changed)
         {
-            outcome.n_added = enrich(roads, path, &mut exact.all);
+            roads.add(path, &mut exact.all);
+            outcome.n_added = path.len() as u64;
         }
         outcome.path = found.path;
     }
@@ -195,21 +196,4 @@ fn join(
     }
     let region = Region::of(model, &ends);
     rrt_connect(ends[0], &[ends[1].to_vec()], &region, &all, &mut rng, budget, is_certified)
-}
-
-/// Nodes of the graph that the ends of a path are joined to, at most.
-const LINKS: usize = 5;
-
-/// Makes a path of certified motions part of the graph, and joins its ends to the nearest nodes. The number of its nodes.
-fn enrich(roads: &mut Roads, path: &[Vec<f64>], exact: &mut Collider) -> u64 {
-    let first = roads.graph.graph.nodes.len();
-    let mut edges: Vec<[usize; 2]> = (1..path.len()).map(|k| [first + k - 1, first + k]).collect();
-    for end in [0, path.len() - 1] {
-        let near = roads.nearest(&path[end], LINKS);
-        let is_joined =
-            |&node: &usize| exact.is_certified_free(&Track::straight(&roads.graph.graph.nodes[node], &path[end]));
-        edges.extend(near.into_iter().find(is_joined).map(|node| [node, first + end]));
-    }
-    roads.enrich(path.to_vec(), &edges);
-    path.len() as u64
 }

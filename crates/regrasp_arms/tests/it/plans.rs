@@ -1,13 +1,16 @@
 //! Plans of scenes.
 
 use crate::places::repository;
+use regrasp_arms::plan::{build_graph, grow_graph, plan_with_graph};
 use regrasp_arms::plan_motion;
-use regrasp_base::Budget;
+use regrasp_arms::roadmap::{BuildSettings, Roads, SuperGraph};
+use regrasp_base::{Budget, Rng};
 use regrasp_manipulation::failure::FailureKind;
 use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings};
 use regrasp_plan::check::{CheckSettings, check_robot};
-use regrasp_scene::{LoadedScene, MotionQuery, load_scene};
-use std::path::PathBuf;
+use regrasp_robot::manipulator::layout::Part;
+use regrasp_scene::{LoadedScene, MotionGoal, MotionQuery, load_scene};
+use std::path::{Path, PathBuf};
 
 const SCENE: &str = r#"format = "regrasp-scene"
 format_version = 2
@@ -81,4 +84,43 @@ fn a_start_in_collision_is_refused_with_the_pair_and_a_free_posture() {
     assert_eq!(failure.kind, FailureKind::StartInvalid, "{failure}");
     assert!(failure.message.contains("\"lamp\"") && failure.message.contains("mm"), "{}", failure.message);
     assert!(failure.advice.contains("nearest free posture"), "{}", failure.advice);
+}
+
+#[test]
+fn what_a_graph_lacked_is_found_once() {
+    let loaded = load("grown", "0.75, 0.0, 0.45");
+    let world = (&loaded.scene, &loaded.state);
+    let mut query = query(&loaded);
+    let of_graph = BuildSettings { nodes_per_arm: 2, ..BuildSettings::default() };
+    let mut roads = Roads::new(build_graph(world, &query, &of_graph, 1).unwrap());
+    // Nothing is easy: each motion is asked of the graph first.
+    let settings = MotionSettings::default();
+    let (mut n_new, mut n_known) = (0, 0);
+    for goal in 0..12 {
+        let mut rng = Rng::keyed(goal, "goal", 0);
+        let robot = &loaded.scene.robots[query.robot].manipulator;
+        let MotionGoal::Joints(joints) = &mut query.goal else { panic!("joints") };
+        for (k, coordinate) in robot.layout.coordinates.iter().enumerate() {
+            if !matches!(coordinate.part, Part::Hand(_)) {
+                joints[k] = rng.uniform(coordinate.lower, coordinate.upper);
+            }
+        }
+        let ask = |roads: &Roads| plan_with_graph(world, &query, &settings, (3, &Budget::work(3_000_000)), roads);
+        let Ok(first) = ask(&roads) else { continue };
+        let report = check_robot(world, Some(&query), &first.plan, &CheckSettings::default());
+        assert!(report.accepted(), "{:?}", report.violations);
+        let Some(way) = first.new_way else { continue };
+        n_new += 1;
+        assert_eq!(way[0], query.start);
+        let n_before = roads.graph.graph.nodes.len();
+        let (grown, n_added) = grow_graph(world, &query, &roads, &[way]);
+        assert_eq!(grown.graph.graph.nodes.len(), n_before + n_added);
+        roads = Roads::new(SuperGraph::from_json(Path::new("grown"), &grown.graph.to_json()).unwrap());
+        let second = ask(&roads).unwrap();
+        let report = check_robot(world, Some(&query), &second.plan, &CheckSettings::default());
+        assert!(report.accepted(), "{:?}", report.violations);
+        n_known += usize::from(second.new_way.is_none());
+    }
+    println!("{n_new} {n_known}");
+    assert!(n_new >= 2 && n_known == n_new, "{n_known} of {n_new}");
 }

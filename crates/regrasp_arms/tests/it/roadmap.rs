@@ -90,3 +90,53 @@ fn queries_go_around_what_the_graph_does_not_know_and_enrich_it() {
     }
     assert_eq!(graph.graph.graph.nodes.len() as u64, n_before as u64 + first.n_added);
 }
+
+#[test]
+fn a_graph_grows_by_ways_and_leaves_out_what_is_not_free() {
+    let (model, world) = (model(), World::new(table()));
+    let graph = build(&model, &world, &small(), 2).unwrap();
+    let roads = Roads::new(graph.clone());
+    let settings = ColliderSettings { clearance: graph.clearance, ..ColliderSettings::default() };
+    let mut all = Collider::new(&model, &world, settings);
+    // New configurations near nodes, and one in which the right hand is in the table.
+    let near = |node: usize, by: f64| -> Vec<f64> {
+        let drawn = graph.graph.nodes[node].iter().zip(&model.coordinates);
+        drawn.map(|(q, c)| (q + by).clamp(c.lower, c.upper)).collect()
+    };
+    let mut is_free = |p: &[f64], q: &[f64]| all.is_certified_free(&Track::straight(p, q));
+    let mut free = Vec::new();
+    for node in 0..graph.graph.nodes.len() {
+        let way = vec![near(node, 0.01), near(node, 0.02), near(node, 0.03)];
+        if way.windows(2).all(|pair| is_free(&pair[0], &pair[1])) {
+            free.push(way);
+        }
+    }
+    let [first, last] = [&free[0], &free[free.len() - 1]];
+    let mut blocked = None;
+    let mut rng = regrasp_base::Rng::keyed(5, "blocked", 0);
+    while blocked.is_none() {
+        let drawn: Vec<f64> = model.coordinates.iter().map(|c| rng.uniform(c.lower, c.upper)).collect();
+        blocked = (!is_free(&drawn, &drawn)).then_some(drawn);
+    }
+    let way: Vec<Vec<f64>> = first.iter().cloned().chain(blocked).chain(last.iter().cloned()).collect();
+    let (grown, n_added) = roads.grown_by(std::slice::from_ref(&way), &model, &world);
+    let n_before = graph.graph.nodes.len();
+    assert_eq!(n_added, 6);
+    assert_eq!(grown.graph.graph.nodes[n_before..n_before + 3], way[..3]);
+    assert_eq!(grown.graph.graph.nodes[n_before + 3..], way[4..]);
+    assert_eq!(grown.graph.graph.nodes[..n_before], graph.graph.nodes[..]);
+    let new: Vec<[u32; 2]> =
+        grown.graph.graph.edges.iter().copied().filter(|edge| edge[1] as usize >= n_before).collect();
+    assert_eq!(grown.graph.graph.edges.len(), graph.graph.edges.len() + new.len());
+    // Each piece between the ends, and its links: each new configuration is a short way from a node of the graph.
+    assert!(new.len() >= 4 + 2, "{new:?}");
+    let of = |node: u32| &grown.graph.graph.nodes[node as usize];
+    for &[a, b] in &new {
+        let track = Track::straight(of(a), of(b));
+        assert!((0..=200).all(|i| all.contact(&track.at(f64::from(i) / 200.0)).is_none()), "{a} {b}");
+    }
+    // Saved and read, it is the same; nothing is grown by nothing.
+    assert_eq!(SuperGraph::from_json(Path::new("graph"), &grown.graph.to_json()).unwrap(), grown.graph);
+    assert_eq!(roads.grown_by(&[], &model, &world), (roads.clone(), 0));
+    assert_eq!(roads.grown_by(&[vec![way[0].clone()]], &model, &world), (roads, 0));
+}

@@ -14,7 +14,7 @@ use regrasp::geometry::frame::rotation_between;
 use regrasp::plan::check::{find_scene_among, robot_along};
 use regrasp::plan::format;
 use regrasp::planners::FailureKind;
-use regrasp::robot_roadmap::Asked;
+use regrasp::robot_roadmap::{Asked, RobotAnswer};
 use regrasp::scene::{LoadedScene, MotionGoal, MotionQuery, PickAndPlaceQuery};
 use regrasp::viewer::render::png_file;
 use regrasp::viewer::robots::{RobotStoryboard, RobotTelling, robot_charts, robot_page, robot_storyboard};
@@ -53,12 +53,19 @@ pub fn plan(
     let asked = Asked { scene: &loaded.scene, state: &loaded.state, query, lists: &lists };
     let with = (&asked, &settings);
     let roadmap = robot_roadmap::find(&arguments.scene, arguments.roadmap.as_deref(), with, talk)?;
+    if arguments.grow && roadmap.is_none() {
+        let problem = "has no roadmap to add to";
+        return Err(Stop::argument("A507", "--grow", problem, "--roadmap FILE, of `regrasp roadmap build`"));
+    }
     // Lists and roadmaps are no part of the search.
     let started = Instant::now();
     let budget = Budget { deadline: limits.time_limit.map(|limit| started + limit), ..budget };
     let any = |plan: RobotPlan| AnyPlan::Robot(Box::new(plan));
+    let mut answer: Option<RobotAnswer> = None;
     let found = match (&roadmap, query) {
-        (Some(roadmap), _) => roadmap.plan(&asked, &settings, arguments.seed, &budget).map(any),
+        (Some((_, roadmap)), _) => roadmap
+            .plan(&asked, &settings, arguments.seed, &budget)
+            .map(|found| any(answer.insert(found).plan().clone())),
         (None, Query::PickAndPlace(query)) => {
             plan_task(around, query, &lists, &settings, arguments.seed, &budget).map(any)
         }
@@ -79,7 +86,11 @@ pub fn plan(
         duration(seconds),
     ));
     talk.event("plan", json!({ "seconds": seconds, "statistics": plan.statistics, "duration": plan.duration() }));
-    write(&plan, arguments, &arguments.judging.after_search(limits.time_limit), common, talk)
+    write(&plan, arguments, &arguments.judging.after_search(limits.time_limit), common, talk)?;
+    match (roadmap, answer) {
+        (Some(known), Some(answer)) if arguments.grow => robot_roadmap::grow(&known, with, &answer, talk),
+        _ => Ok(()),
+    }
 }
 
 /// Arguments that have no meaning for a robot that moves (`A507`).

@@ -34,16 +34,19 @@ pub fn run(arguments: &args::Plan, common: &Common, talk: &Talk) -> Result<(), S
     let loaded = arguments.judging.scene(load::scene_by(&arguments.scene, common, deadline, talk)?);
     let read = loaded.scene.inputs.iter().map(|input| input.path.as_path());
     let named = [&arguments.search.settings, &arguments.roadmap].into_iter().flatten().map(PathBuf::as_path);
-    written.refuse_inputs(read.chain(named))?;
+    written.refuse_inputs(read.clone().chain(named))?;
+    let grown = arguments.roadmap.iter().filter(|_| arguments.grow).map(|path| Output::new("--grow", path));
+    Outputs::new(grown)?.refuse_inputs(read.chain(arguments.search.settings.as_deref()))?;
     if let Some(query) = &loaded.task().of_robot {
         let time_limit = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
         let (max_work, improve_for) = (arguments.search.max_work, arguments.search.improve);
         let limits = Limits { max_work, time_limit, improve_for, cancelled };
         return motion::plan(arguments, common, &loaded, query, &limits, talk);
     }
-    if arguments.roadmap.is_some() {
+    let given = [("--roadmap", arguments.roadmap.is_some()), ("--grow", arguments.grow)];
+    if let Some((flag, _)) = given.into_iter().find(|(_, is_given)| *is_given) {
         let problem = "is for robots that move; a hand's roadmap answers `regrasp roadmap query`";
-        return Err(Stop::argument("A507", "--roadmap", problem, "a task of a whole robot"));
+        return Err(Stop::argument("A507", flag, problem, "a task of a whole robot"));
     }
     let query = arguments.judging.query(loaded.task().query(arguments.seed))?;
     let n_threads = arguments.threads.unwrap_or_else(available_threads);

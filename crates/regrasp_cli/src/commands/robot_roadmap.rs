@@ -10,7 +10,7 @@ use crate::words::{duration, grouped};
 use regrasp::base::{Diagnostic, Place, files};
 use regrasp::pictures::wrist_graph_of;
 use regrasp::planners::FailureKind;
-use regrasp::robot_roadmap::{Asked, RobotRoadmap};
+use regrasp::robot_roadmap::{Asked, RobotAnswer, RobotRoadmap};
 use regrasp::scene::LoadedScene;
 use regrasp::tasks::RoadmapBuildSettings;
 use regrasp::viewer::robots::wrist_graph;
@@ -50,8 +50,12 @@ pub fn build(
         )?;
     let seconds = started.elapsed().as_secs_f64();
     talk.say(format!("graph  {}   {}", roadmap.in_words(), duration(seconds)));
+    save(&roadmap, &arguments.output, seconds, talk)
+}
+
+/// Writes a roadmap whole or not at all; `seconds` is how long it took to make.
+fn save(roadmap: &RobotRoadmap, path: &Path, seconds: f64, talk: &Talk) -> Result<(), Stop> {
     let text = roadmap.to_json();
-    let path = &arguments.output;
     files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
     let sha256 = files::sha256(text.as_bytes());
     talk.say(format!("wrote  {}   {} bytes   sha256 {sha256}", path.display(), grouped(text.len() as u64)));
@@ -60,6 +64,26 @@ pub fn build(
         json!({ "format": "roadmap", "path": path, "bytes": text.len(), "sha256": sha256, "seconds": seconds }),
     );
     Ok(())
+}
+
+/// Saves the roadmap with what an answer has and it has not. Says so where there is nothing new, and writes nothing.
+pub fn grow(
+    (path, roadmap): &(PathBuf, RobotRoadmap),
+    (asked, settings): (&Asked, &PlannerSettings),
+    answer: &RobotAnswer,
+    talk: &Talk,
+) -> Result<(), Stop> {
+    let started = Instant::now();
+    let grown = roadmap.grown_by(asked, settings, answer).map_err(|failure| Stop::NoPlan(Box::new(failure)))?;
+    let seconds = started.elapsed().as_secs_f64();
+    let Some(grown) = grown else {
+        talk.say("grown  by nothing: the plan has no way and no exchange that is new to the roadmap");
+        talk.event("grown", json!({ "path": path, "is_new": false }));
+        return Ok(());
+    };
+    talk.say(format!("grown  {}, before {}   {}", grown.in_words(), roadmap.in_words(), duration(seconds)));
+    talk.event("grown", json!({ "path": path, "is_new": true }));
+    save(&grown, path, seconds, talk)
 }
 
 /// True where a file holds the roadmap of a robot: those of hands are binary.
@@ -105,7 +129,7 @@ pub fn picture(arguments: &args::RoadmapPicture, common: &Common, talk: &Talk) -
     pictures::put(&arguments.output, wrist_graph(&graph, &title).as_bytes(), talk)
 }
 
-/// The roadmap that a plan uses: the one that was named, or the one beside the scene. One beside the scene that was built with other
+/// The roadmap that a plan uses, with its path: the one that was named, or the one beside the scene. One beside the scene that was built with other
 /// inputs is left out, with a note.
 ///
 /// Errors: a file that is no roadmap; one that was named, built with other inputs (`R616`).
@@ -114,7 +138,7 @@ pub fn find(
     named: Option<&Path>,
     (asked, settings): (&Asked, &PlannerSettings),
     talk: &Talk,
-) -> Result<Option<RobotRoadmap>, Stop> {
+) -> Result<Option<(PathBuf, RobotRoadmap)>, Stop> {
     let path: PathBuf = match named {
         Some(path) => path.to_owned(),
         None => scene.with_extension("roadmap.json"),
@@ -129,7 +153,7 @@ pub fn find(
         let seconds = started.elapsed().as_secs_f64();
         talk.say(format!("graph  {}   {}   loaded in {}", path.display(), roadmap.in_words(), duration(seconds)));
         talk.event("roadmap", json!({ "path": path, "seconds": seconds }));
-        return Ok(Some(roadmap));
+        return Ok(Some((path, roadmap)));
     };
     if named.is_some() {
         return Err(Stop::BadInput(roadmap.refuse_other(&path, what)));

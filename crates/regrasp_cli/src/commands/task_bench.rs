@@ -12,7 +12,7 @@ use crate::talk::Talk;
 use regrasp::base::Diagnostic;
 use regrasp::base::Place;
 use regrasp::planners::FailureKind;
-use regrasp::robot_roadmap::{Asked, RobotRoadmap};
+use regrasp::robot_roadmap::{Asked, RobotAnswer, RobotRoadmap};
 use regrasp::scene::pick_and_place::PICK_AND_PLACE;
 use regrasp::scene::{LoadedScene, Query, load_scene};
 use regrasp::tasks::RoadmapBuildSettings;
@@ -79,7 +79,7 @@ pub fn run(files: &[PathBuf], arguments: &args::Bench, common: &Common, talk: &T
                     let lists = lists.as_ref().map_err(Clone::clone)?;
                     if let Some((roadmap, _)) = &prepared {
                         let asked = Asked { scene: &loaded.scene, state: &loaded.state, query, lists };
-                        return roadmap.plan(&asked, &settings, seed, &budget);
+                        return roadmap.plan(&asked, &settings, seed, &budget).map(RobotAnswer::into_plan);
                     }
                     let query = query.as_pick_and_place().expect("the scene asks for pick and place");
                     plan_task((&loaded.scene, &loaded.state), query, lists, &settings, seed, &budget)

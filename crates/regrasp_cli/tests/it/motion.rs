@@ -110,4 +110,33 @@ fn a_roadmap_of_a_robot_is_built_used_and_refused_elsewhere() {
     folder.write("b.json", "{}");
     let run = folder.run(&["plan", SCENE, "--task", "swing", "--roadmap", "b.json"]);
     assert!(run.code == Some(2) && run.err.contains("R601"), "{run:?}");
+    // Nothing to grow, and a roadmap of other obstacles.
+    fs::remove_file(folder.path("scenes/two_arms/among_lamps.roadmap.json")).unwrap();
+    for named in [&[][..], &["--roadmap", "a.json"]] {
+        let run = folder.run(&[&["plan", SCENE, "--task", "swing", "--grow"], named].concat());
+        assert!(run.code == Some(2) && (run.err.contains("A507") || run.err.contains("R616")), "{run:?}");
+    }
+}
+
+#[test]
+fn a_roadmap_of_a_robot_grows_and_is_saved() {
+    let folder = folder();
+    folder.write("small.json", r#"{"nodes_per_arm": 2}"#);
+    let build = ["roadmap", "build", SCENE, "--task", "swing", "--build-settings", "small.json", "-o", "a.json"];
+    succeeds(folder.run(&build));
+    let built = fs::read(folder.path("a.json")).unwrap();
+    let plan = |seed: &str| {
+        let grow = ["plan", SCENE, "--task", "swing", "--roadmap", "a.json", "--grow", "-o", "plan.json"];
+        succeeds(folder.run(&[&grow[..], &["--seed", seed]].concat()))
+    };
+    // A motion that few samples find is not asked of the graph; others become part of it.
+    for seed in 0..4 {
+        let before = fs::read(folder.path("a.json")).unwrap();
+        let run = plan(&seed.to_string());
+        assert!(run.err.contains("grown"), "{run:?}");
+        let after = fs::read(folder.path("a.json")).unwrap();
+        assert_eq!(run.err.contains("grown  by nothing"), before == after, "{run:?}");
+        succeeds(folder.run(&["roadmap", "info", "a.json"]));
+    }
+    assert!(fs::read(folder.path("a.json")).unwrap().len() >= built.len());
 }

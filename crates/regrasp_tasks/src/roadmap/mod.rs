@@ -20,6 +20,7 @@ use regrasp_arms::roadmap::{Roads, fingerprint_of_robot, fingerprint_of_world};
 use regrasp_base::Budget;
 use regrasp_base::files::sha256;
 use regrasp_grasp::list::GraspList;
+use regrasp_plan::RobotPlan;
 use regrasp_scene::{PickAndPlaceQuery, Scene, State};
 use std::fmt::Write as _;
 
@@ -43,6 +44,17 @@ pub struct DoubleGrasps {
     pub hands: [usize; 2],
     /// Indices of their grasps, in rising order.
     pub pairs: Vec<[usize; 2]>,
+}
+
+/// A plan, and what a roadmap can learn from it.
+#[derive(Debug, Clone)]
+pub struct TaskAnswer {
+    /// The plan.
+    pub plan: RobotPlan,
+    /// States at the corners of paths that the super graph was asked for and did not have.
+    pub(crate) new_ways: Vec<Vec<Vec<f64>>>,
+    /// Exchanges of the plan.
+    pub(crate) exchanges: Vec<Give>,
 }
 
 /// A roadmap of pick and place.
@@ -69,6 +81,39 @@ impl TaskRoadmap {
     /// The state of the robot at each exchange: both hands are at the object.
     pub fn exchange_states(&self) -> impl Iterator<Item = &[f64]> {
         self.exchanges.iter().map(|give| give.way_in.ends()[0].as_slice())
+    }
+
+    /// The roadmap with what `answer` has and it has not: ways of the arms where they are free for the robot and the rest as the super
+    /// graph knows them, and exchanges of pairs of grasps that had none. Scene, query, lists and settings are those of the answer.
+    ///
+    /// Errors: as `plan_pick_and_place` before any search.
+    pub fn grown_by(
+        &self,
+        (scene, state): (&Scene, &State),
+        query: &PickAndPlaceQuery,
+        lists: &[(usize, GraspList)],
+        settings: &TaskSettings,
+        answer: &TaskAnswer,
+    ) -> Result<TaskRoadmap, Failure> {
+        let prepared = Prepared::new(scene, query, lists, settings)?;
+        let models = prepared.models();
+        let budget = Budget::unlimited();
+        let context = Context::new((scene, state), query, (&prepared, &models), settings, (0, &budget))?;
+        let mut grown = self.clone();
+        if let Some(roads) = &self.roads {
+            let model = graph_model(&context);
+            let of_model = |way: &Vec<Vec<f64>>| way.iter().map(|state| model.configuration_of(state)).collect();
+            let ways: Vec<Vec<Vec<f64>>> = answer.new_ways.iter().map(of_model).collect();
+            grown.roads = Some(roads.grown_by(&ways, &model, &context.fixed).0);
+        }
+        for give in &answer.exchanges {
+            let is_same = |own: &Give| own.giver == give.giver && own.taker == give.taker;
+            if !grown.exchanges.iter().any(is_same) {
+                grown.exchanges.push(give.clone());
+            }
+        }
+        grown.exchanges.sort_by_key(|give| (give.giver, give.taker));
+        Ok(grown)
     }
 
     /// What differs from what the roadmap was made for, in words. None where nothing does.

@@ -28,7 +28,7 @@ fn a_saved_roadmap_gives_the_plans_of_one_in_memory() {
     let budget = Budget::work(20_000_000);
     for seed in 0..2 {
         let plan = |roadmap: &TaskRoadmap| {
-            plan_with_roadmap(world, &case.query, &case.lists, &settings, (seed, &budget), Some(roadmap)).unwrap()
+            plan_with_roadmap(world, &case.query, &case.lists, &settings, (seed, &budget), Some(roadmap)).unwrap().plan
         };
         let (first, second) = (plan(&roadmap), plan(&saved));
         assert_eq!(first, second);
@@ -38,6 +38,32 @@ fn a_saved_roadmap_gives_the_plans_of_one_in_memory() {
             (vec!["right".to_owned(), "left".to_owned()], "super_graph")
         );
     }
+}
+
+#[test]
+fn a_roadmap_grows_by_what_a_plan_has_and_it_has_not() {
+    let case = Case::new("justin_horse.toml");
+    let settings = TaskSettings::default();
+    let world = (&case.loaded.scene, &case.loaded.state);
+    let of_build = RoadmapBuildSettings { nodes_per_arm: 2, exchanges: 0, tries: 0 };
+    let budget = Budget::work(50_000_000);
+    let built =
+        build_roadmap(world, &case.query, &case.lists, (&settings, &of_build), (1, &Budget::unlimited())).unwrap();
+    assert_eq!(built.n_exchanges(), 0);
+    let ask = |roadmap: &TaskRoadmap| {
+        plan_with_roadmap(world, &case.query, &case.lists, &settings, (4, &budget), Some(roadmap)).unwrap()
+    };
+    let first = ask(&built);
+    accepted_by_checker(&case, &first.plan, 4);
+    let grown = built.grown_by(world, &case.query, &case.lists, &settings, &first).unwrap();
+    assert_eq!((grown.n_exchanges(), &grown.origin), (1, &built.origin));
+    let grown = TaskRoadmap::from_json(Path::new("roadmap"), &grown.to_json()).unwrap();
+    assert_eq!(grown.differs_from(world, &case.query, &case.lists, &settings).unwrap(), None);
+    // The exchange is taken from the roadmap now, and is not added again.
+    let second = ask(&grown);
+    accepted_by_checker(&case, &second.plan, 4);
+    let again = grown.grown_by(world, &case.query, &case.lists, &settings, &second).unwrap();
+    assert_eq!(again.n_exchanges(), 1);
 }
 
 #[test]
