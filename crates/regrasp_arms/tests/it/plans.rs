@@ -98,7 +98,7 @@ fn what_a_graph_lacked_is_found_once() {
     let (mut n_new, mut n_known) = (0, 0);
     for goal in 0..12 {
         let mut rng = Rng::keyed(goal, "goal", 0);
-        let robot = &loaded.scene.robots[query.robot].manipulator;
+        let robot = &loaded.scene.robots[query.robot];
         let MotionGoal::Joints(joints) = &mut query.goal else { panic!("joints") };
         for (k, coordinate) in robot.layout.coordinates.iter().enumerate() {
             if !matches!(coordinate.part, Part::Hand(_)) {
