@@ -166,7 +166,7 @@ pub struct Plan {
     /// Write a page for a browser too: of the plan, or of the causes when there is none
     #[arg(long, value_name = "FILE.html")]
     pub report: Option<PathBuf>,
-    /// When no plan is found, write pictures of the causes and of the searched graph to this folder
+    /// When no plan is found, write pictures of the causes, and of the searched graph or the robot's nearest miss, to this folder
     #[arg(long, value_name = "DIR")]
     pub failure: Option<PathBuf>,
     /// Threads [default: all cores]; the plan does not depend on it

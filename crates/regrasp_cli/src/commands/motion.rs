@@ -2,16 +2,17 @@
 
 use crate::args::{self, Common};
 use crate::commands::written::{self, Limits, available_threads};
-use crate::commands::{robot_roadmap, task_grasps};
+use crate::commands::{pictures, robot_roadmap, task_grasps};
 use crate::judge;
 use crate::load;
 use crate::outputs::Outputs;
+use crate::pages;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
 use regrasp::base::{Diagnostic, Place, files};
 use regrasp::geometry::frame::rotation_between;
-use regrasp::plan::check::{find_scene_among, robot_along};
+use regrasp::plan::check::{Report, RobotAlong, find_scene_among, robot_along};
 use regrasp::plan::format;
 use regrasp::planners::FailureKind;
 use regrasp::robot_roadmap::Asked;
@@ -24,7 +25,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Plans the motion of the first task, judges it and writes it.
+/// Plans the motion of the first task, judges it and writes it; a page and pictures of a failure where they are asked for.
 pub fn plan(
     arguments: &args::Plan,
     common: &Common,
@@ -35,6 +36,23 @@ pub fn plan(
 ) -> Result<(), Stop> {
     refuse_in_hand_arguments(arguments)?;
     say_query(loaded, query, arguments.seed, talk);
+    let found = search(arguments, common, loaded, query, limits, talk);
+    if let Err(Stop::NoRobotPlan(failure) | Stop::NoGrasp(failure)) = &found {
+        let asked = (arguments.failure.as_deref(), arguments.report.as_deref());
+        pictures::write_robot_failure(asked, loaded, query, failure, talk)?;
+    }
+    write(&found?, arguments, &arguments.judging.after_search(limits.time_limit), common, talk)
+}
+
+/// The plan, with what is said of it.
+fn search(
+    arguments: &args::Plan,
+    common: &Common,
+    loaded: &LoadedScene,
+    query: &Query,
+    limits: &Limits,
+    talk: &Talk,
+) -> Result<RobotPlan, Stop> {
     let started = Instant::now();
     let budget = Budget {
         max_work: limits.max_work,
@@ -79,7 +97,7 @@ pub fn plan(
         duration(seconds),
     ));
     talk.event("plan", json!({ "seconds": seconds, "statistics": plan.statistics, "duration": plan.duration() }));
-    write(&plan, arguments, &arguments.judging.after_search(limits.time_limit), common, talk)
+    Ok(*plan)
 }
 
 /// Arguments that have no meaning for a robot that moves (`A507`).
@@ -88,8 +106,6 @@ fn refuse_in_hand_arguments(arguments: &args::Plan) -> Result<(), Stop> {
         ("--margin", arguments.search.margin.is_some()),
         ("--improve", arguments.search.improve.is_some()),
         ("--improve-work", arguments.search.improve_work.is_some()),
-        ("--report", arguments.report.is_some()),
-        ("--failure", arguments.failure.is_some()),
         ("--hold", arguments.judging.hold),
     ];
     match given.into_iter().find(|(_, is_given)| *is_given) {
@@ -114,7 +130,14 @@ fn write(
     let read = format::robot_from_json(plan_path, bytes.as_bytes())
         .map_err(|error| Stop::Internal(format!("a plan just made is not a plan file: {error}")))?;
     let again = load::motion_scene(&arguments.scene, &read.query, common)?;
-    let report = judge::judge_robot(&judging.scene(again), &read, judging, talk);
+    let again = judging.scene(again);
+    let report = judge::judge_robot(&again, &read, judging, talk);
+    if let Some(page) = &arguments.report {
+        let problem = |problem: String| Stop::Internal(format!("a plan just made cannot be drawn: {problem}"));
+        let along = robot_along((&again.scene, &again.state), &read, MOMENTS).map_err(problem)?;
+        let html = robot_page(&telling((&again, &read), (&report, &along), None), &RobotStoryboard::default());
+        pages::write_html(page, &html.map_err(problem)?, talk)?;
+    }
     if !report.accepted() {
         return Err(written::rejected(output, &bytes, talk));
     }
@@ -198,6 +221,14 @@ pub fn check(
     if report.accepted() { Ok(()) } else { Err(Stop::Rejected) }
 }
 
+fn telling<'a>(
+    (loaded, plan): (&'a LoadedScene, &'a RobotPlan),
+    (report, along): (&'a Report, &'a RobotAlong),
+    title: Option<&'a str>,
+) -> RobotTelling<'a> {
+    RobotTelling { scene: &loaded.scene, state: &loaded.state, plan, report, along, title }
+}
+
 /// Moments of the chart of clearance.
 const MOMENTS: usize = 400;
 
@@ -218,14 +249,7 @@ pub fn view(arguments: &args::View, bytes: &[u8], written: &Outputs, common: &Co
     let report = judge::judge_robot(&loaded, &plan, &arguments.judging, talk);
     let unfit = |problem: String| Stop::BadInput(Diagnostic::new("C408", Place::file(&arguments.plan), problem).into());
     let along = robot_along((&loaded.scene, &loaded.state), &plan, MOMENTS).map_err(unfit)?;
-    let telling = RobotTelling {
-        scene: &loaded.scene,
-        state: &loaded.state,
-        plan: &plan,
-        report: &report,
-        along: &along,
-        title: arguments.title.as_deref(),
-    };
+    let telling = telling((&loaded, &plan), (&report, &along), arguments.title.as_deref());
     let settings = RobotStoryboard { frames: arguments.frames, width: arguments.width, columns: arguments.columns };
     let put = |path: &Path, bytes: &[u8]| -> Result<(), Stop> {
         files::write_atomic(path, bytes).map_err(|error| Stop::unwritable(path, &error))?;
