@@ -40,6 +40,8 @@ gallery: release
 	$(REGRASP) roadmap build scenes/box_90x.toml $(PLAIN) --places 120 --angle 100 -o $(OUT)/gallery/box.roadmap
 	$(REGRASP) roadmap picture $(OUT)/gallery/box.roadmap scenes/box_90x.toml -o $(GALLERY)/roadmap.svg
 	$(REGRASP) plan scenes/out_of_reach.toml -o $(OUT)/gallery/none.json --max-work 300000 --failure $(GALLERY)/out-of-reach; test $$? -eq 1
+	$(REGRASP) plan scenes/two_arms/impossible_place.toml -o $(OUT)/gallery/none.json --failure $(GALLERY)/impossible-place; test $$? -eq 1
+	$(REGRASP) plan scenes/two_arms/impossible_double_grasp.toml -o $(OUT)/gallery/none.json --failure $(GALLERY)/impossible-double-grasp; test $$? -eq 1
 ifneq ($(PACKAGES),)
 	$(REGRASP) plan scenes/allegro/cube57_z.toml $(PACKAGES) --seed 1 -o $(OUT)/gallery/cube.json
 	$(REGRASP) view $(OUT)/gallery/cube.json scenes/allegro/cube57_z.toml $(PACKAGES) --png $(GALLERY)/allegro-cube.png --frames 8 --width 1400 --svg $(GALLERY)/allegro-cube

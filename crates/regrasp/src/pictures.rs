@@ -7,9 +7,10 @@ use regrasp_geometry::frame::{parts_of, pose_distance, rotation_between};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_plan::Plan;
 use regrasp_planners::in_hand::roadmap::GraspRoadmap;
+use regrasp_planners::robot_miss::{ExchangeOutcome, MetBody, MetKind, RobotMiss, WantedHand};
 use regrasp_planners::{Failure, Outline, OutlineEdge, OutlineNode};
-use regrasp_scene::{HandView, Query, Scene};
-use regrasp_viewer::robots::{WristGraph, corners};
+use regrasp_scene::{HandView, Query, Scene, State};
+use regrasp_viewer::robots::{ExchangePlaces, Met, MissingHand, RobotFailure, WristGraph, corners};
 use regrasp_viewer::story::{
     CauseStory, FailureStory, NearestMissStory, RoadmapEdge, RoadmapEdgeKind, RoadmapNode, RoadmapStory,
 };
@@ -85,6 +86,73 @@ pub fn failure_story(failure: &Failure) -> FailureStory {
     }
 }
 
+/// What failed of a task of a whole robot, in its scene: the nearest miss, or the start where there is none. `story` is that of the
+/// failure. None for a query of a single hand.
+pub fn robot_failure<'a>(
+    (scene, state): (&'a Scene, &'a State),
+    query: &'a Query,
+    failure: &'a Failure,
+    story: &'a FailureStory,
+) -> Option<RobotFailure<'a>> {
+    let (robot, start, object) = match query {
+        Query::Motion(of) => (of.robot, &of.start, None),
+        Query::PickAndPlace(of) => {
+            (of.robot, &of.start, Some((of.object, [of.world_from_object_start, of.world_from_object_goal])))
+        }
+        Query::InHand(_) | Query::Tracking(_) => return None,
+    };
+    let miss = failure.robot_miss.as_deref();
+    let here = miss.and_then(|miss| miss.world_from_object.as_ref()).map(Pose::from);
+    let met = |body: &MetBody| match body.kind {
+        MetKind::Link => Met::Link(body.name.clone()),
+        MetKind::Carried => Met::Object(body.name.clone()),
+        MetKind::Resting => Met::Resting(body.name.clone()),
+    };
+    let missing = |wanted: &WantedHand| {
+        let hand = scene.hands[scene.hand_named(&wanted.hand)?].carrier?.hand;
+        Some(MissingHand {
+            hand,
+            world_from_hand: Pose::from(&wanted.world_from_hand),
+            wrist: wanted.wrist.map(Point::from),
+        })
+    };
+    let wanted = miss.map_or(&[][..], |miss| &miss.wanted);
+    Some(RobotFailure {
+        scene,
+        state,
+        robot,
+        joints: miss.map_or(start, |miss| &miss.joints),
+        what: miss.map_or_else(String::new, in_words),
+        object: object.map(|(index, [start, goal])| (index, [here.unwrap_or(start), start, goal])),
+        meeting: miss.and_then(|miss| miss.meeting.as_ref()).map(|meeting| [0, 1].map(|k| met(&meeting.bodies[k]))),
+        missing: wanted.iter().filter_map(missing).collect(),
+        exchanges: miss.map_or_else(Vec::new, exchange_places),
+        failure: story,
+    })
+}
+
+fn in_words(miss: &RobotMiss) -> String {
+    match &miss.meeting {
+        Some(meeting) => format!("{}: {}", miss.reason, meeting.in_words()),
+        None => miss.reason.clone(),
+    }
+}
+
+/// Places of exchanges by their outcome.
+fn exchange_places(miss: &RobotMiss) -> Vec<ExchangePlaces> {
+    let outcomes = [
+        (ExchangeOutcome::HandsTouch, "hands touch, wherever the object is"),
+        (ExchangeOutcome::OutOfReach, "out of reach"),
+        (ExchangeOutcome::InCollision, "in collision"),
+        (ExchangeOutcome::NoWay, "without a way of a hand or finger"),
+    ];
+    let of = |(outcome, words): (ExchangeOutcome, &str)| ExchangePlaces {
+        outcome: words.into(),
+        places: miss.exchanges.iter().filter(|at| at.outcome == outcome).map(|at| at.position.into()).collect(),
+    };
+    outcomes.into_iter().map(of).collect()
+}
+
 /// Lines of facts about the search that failed.
 pub fn failure_facts(failure: &Failure) -> Vec<(String, String)> {
     let mut facts = vec![("Result".to_owned(), format!("NO PLAN: {}", kind_of(failure).replace('_', " ")))];
@@ -98,6 +166,9 @@ pub fn failure_facts(failure: &Failure) -> Vec<(String, String)> {
     if let Some(reached) = &failure.reached {
         facts
             .push(("Graph".into(), format!("{} grasps in {} components", reached.nodes.len(), reached.n_components())));
+    }
+    if let Some(miss) = &failure.robot_miss {
+        facts.push(("Nearest".into(), in_words(miss)));
     }
     let statistics = &failure.statistics;
     if statistics.work > 0 {

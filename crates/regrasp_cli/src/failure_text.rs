@@ -48,6 +48,10 @@ fn text_under(heading: &str, failure: &Failure) -> String {
         );
     }
     if !failure.causes.is_empty() {
+        // Before any search the message names them.
+        if let Some(meeting) = failure.robot_miss.as_ref().and_then(|miss| miss.meeting.as_ref()) {
+            let _ = writeln!(out, "  nearest: {}", meeting.in_words());
+        }
         let tried: u64 = failure.causes.iter().map(|cause| cause.count).sum();
         let _ = writeln!(out, "  {} tries of the search failed:", grouped(tried));
         for cause in failure.causes.iter().take(8) {
@@ -116,6 +120,7 @@ mod tests {
                 distance_left: 0.0012,
                 joints: vec![],
             })),
+            robot_miss: None,
             reached: None,
             statistics: Default::default(),
         };

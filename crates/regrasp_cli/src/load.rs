@@ -134,6 +134,7 @@ fn in_time_or_no_plan(error: InputError) -> Stop {
             causes: Vec::new(),
             leg: None,
             nearest_miss: None,
+            robot_miss: None,
             reached: None,
             statistics: Default::default(),
         })),

@@ -2,6 +2,7 @@
 
 use crate::grasp::state::MAX_FINGERS;
 use crate::outline::Outline;
+use crate::robot_miss::RobotMiss;
 use regrasp_base::Interrupt;
 use regrasp_plan::plan::{PoseData, Statistics};
 use regrasp_scene::HandView;
@@ -80,6 +81,8 @@ pub struct Failure {
     pub leg: Option<usize>,
     /// The nearest that the search came to the goal (or to the end of that leg), if it got anywhere.
     pub nearest_miss: Option<Box<NearestMiss>>,
+    /// The nearest miss of a task of a whole robot: a posture, and what is wrong with it.
+    pub robot_miss: Option<Box<RobotMiss>>,
     /// What was reached when the search ended: of the attempt that reached most, where the method is `gait`. Not in events.
     #[serde(skip)]
     pub reached: Option<Box<Outline>>,
@@ -97,6 +100,7 @@ impl Failure {
             causes: Vec::new(),
             leg: None,
             nearest_miss: None,
+            robot_miss: None,
             reached: None,
             statistics: Statistics::default(),
         }

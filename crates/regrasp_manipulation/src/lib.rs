@@ -29,6 +29,8 @@ pub mod progress;
 pub mod recording;
 /// The relocation of one finger.
 pub mod relocation;
+/// The nearest miss of a task of a whole robot.
+pub mod robot_miss;
 /// Fingertips that roll.
 pub mod rolling;
 /// Settings of motions, forces and times.

@@ -15,7 +15,7 @@ pub use regrasp_manipulation::motion_settings::{MotionMethod, MotionSettings, Va
 pub use regrasp_manipulation::outline::{Outline, OutlineEdge, OutlineNode};
 pub use regrasp_manipulation::progress::Progress;
 pub use regrasp_manipulation::task_settings::{TaskCost, TaskSettings};
-pub use regrasp_manipulation::{failure, outline};
+pub use regrasp_manipulation::{failure, outline, robot_miss};
 pub use settings::{InHandSettings, Method};
 pub use tracking::{TrackingMethod, TrackingSettings, plan_tracking};
 

@@ -4,16 +4,18 @@
 mod alone;
 
 use crate::context::{Context, Grasp};
-use crate::failing::Tally;
+use crate::failing::{Stage, Tally, Try};
 use crate::line::{LINE_STEPS, are_states_free, is_state_free, is_way_free, straight};
-use crate::station::{Effort, can_close, common_postures, with_fingers};
+use crate::station::{Effort, WAY_SHARES, can_close, common_postures, with_fingers};
 use crate::timing::Smooth;
+pub use alone::own_collider;
 use alone::{Alone, At};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 use regrasp_arms::model::ArmModel;
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp_lists::pairs::are_hands_apart;
+use regrasp_manipulation::robot_miss::{ExchangeOutcome, TriedExchange};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -25,9 +27,6 @@ const TURN_SPREAD: f64 = 0.4;
 const COMMON_DRAWS: usize = 2;
 /// The grid reaches so far beyond shoulders, start and goal, in metres.
 const BEYOND: f64 = 0.3;
-/// Shares of the ways in and out that are tried.
-const WAY_SHARES: [f64; 2] = [1.0, 0.4];
-
 /// Places that are tried with little effort.
 const LITTLE_PLACES: usize = 8;
 
@@ -52,6 +51,8 @@ pub struct Places {
     alone: Alone,
     /// How near pairs of grasps came with little effort, by the index of the reason.
     reached: BTreeMap<[[usize; 2]; 2], usize>,
+    /// By position: the furthest that any pair came, by the index of the reason. None where none was tried.
+    came: Vec<Option<usize>>,
 }
 
 /// Where the shoulder of a hand's arm is at the start.
@@ -93,12 +94,35 @@ impl Places {
             }
         }
         nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let positions = nodes
+        let positions: Vec<Point> = nodes
             .into_iter()
             .map(|(_, at)| at)
             .filter(|at| context.fixed.is_ball_free(at, radius))
-            .take(context.settings.exchange_places);
-        Places { positions: positions.collect(), turns: turns(), alone: Alone::default(), reached: BTreeMap::new() }
+            .take(context.settings.exchange_places)
+            .collect();
+        let came = vec![None; positions.len()];
+        Places { positions, turns: turns(), alone: Alone::default(), reached: BTreeMap::new(), came }
+    }
+
+    /// Places at which pairs of grasps were tried, and how far these came.
+    pub fn tried(&self) -> impl Iterator<Item = TriedExchange> {
+        let outcome = |reason: usize| match reason {
+            0 => ExchangeOutcome::OutOfReach,
+            1 => ExchangeOutcome::InCollision,
+            _ => ExchangeOutcome::NoWay,
+        };
+        let all = self.positions.iter().zip(&self.came);
+        all.filter_map(move |(at, came)| Some(TriedExchange { position: at.coords.into(), outcome: outcome((*came)?) }))
+    }
+
+    /// Poses of the object for a pair of grasps, the best places first, with the most natural turns at each.
+    pub fn poses(&self, context: &Context, pair: [[usize; 2]; 2]) -> impl Iterator<Item = Pose> {
+        let natural = Natural::new(context, pair);
+        let n_turns = context.settings.exchange_turns;
+        self.positions.iter().flat_map(move |at| {
+            let ranked = natural.ranked(at, &self.turns).into_iter().take(n_turns);
+            ranked.map(|(_, turn)| pose_at(context, at, &self.turns[turn])).collect::<Vec<Pose>>()
+        })
     }
 
     /// Positions of the object's centre of mass, the best first.
@@ -114,23 +138,10 @@ impl Places {
         effort: Effort,
         tally: &mut Tally,
     ) -> Result<Give, &'static str> {
-        let Places { positions, turns, alone, reached } = self;
+        let Places { positions, turns, alone, reached, came } = self;
         let mut attempt = Attempt::new(context, giver, taker, alone);
         attempt.reached = reached.get(&[giver, taker]).copied().unwrap_or(0);
-        let shoulders = [giver, taker].map(|[hand, _]| shoulder(context, hand));
-        let grasps = [giver, taker].map(|[hand, grasp]| &context.hands[hand].grasps[grasp]);
-        // How natural an orientation is at a place: the directions in which the hands come, and from the shoulders to the object.
-        let natural = |at: &Point, turn: &UnitQuaternion<f64>| -> f64 {
-            let of = |k: usize| {
-                let comes = turn * grasps[k].direction;
-                (at - shoulders[k]).try_normalize(1e-9).map_or(0.0, |towards| towards.dot(&comes))
-            };
-            of(0).min(of(1)) + 0.1 * (of(0) + of(1))
-        };
-        let pose = |at: &Point, turn: &UnitQuaternion<f64>| {
-            let position = at.coords - turn * context.object.center_of_mass.coords;
-            Pose::from_parts(Translation3::from(position), *turn)
-        };
+        let natural = Natural::new(context, [giver, taker]);
         let n_little = LITTLE_PLACES.min(positions.len());
         let (places, n_draws) = match effort {
             Effort::Little => (0..n_little, 0),
@@ -138,15 +149,15 @@ impl Places {
         };
         for place in places {
             let at = &positions[place];
-            let mut ranked: Vec<(f64, usize)> =
-                turns.iter().enumerate().map(|(index, turn)| (natural(at, turn), index)).collect();
-            ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-            for &(_, turn) in ranked.iter().take(context.settings.exchange_turns) {
-                let pose = (&pose(at, &turns[turn]), Some([place, turn]));
+            let before = std::mem::take(&mut attempt.reached);
+            for (_, turn) in natural.ranked(at, turns).into_iter().take(context.settings.exchange_turns) {
+                let pose = (&pose_at(context, at, &turns[turn]), Some([place, turn]));
                 if let Some(give) = attempt.at(pose, &context.query.start, tally) {
                     return Ok(give);
                 }
             }
+            came[place] = came[place].max(Some(attempt.reached));
+            attempt.reached = attempt.reached.max(before);
         }
         // Drawn about the best places.
         let index = ((giver[0] * 1009 + giver[1]) * 1009 + taker[0]) * 1009 + taker[1];
@@ -165,13 +176,13 @@ impl Places {
                     let turn = turns[rng.below(turns.len())];
                     let bend = Vector::new(rng.normal(), rng.normal(), rng.normal()) * TURN_SPREAD;
                     let turn = UnitQuaternion::from_scaled_axis(bend) * turn;
-                    (natural(&at, &turn), turn)
+                    (natural.of(&at, &turn), turn)
                 })
                 .max_by(|a, b| a.0.total_cmp(&b.0));
             let Some((_, turn)) = best else { continue };
             let commons = common_postures(context, &hands, &context.query.start, COMMON_DRAWS, &mut rng);
             for common in &commons {
-                if let Some(give) = attempt.at((&pose(&at, &turn), None), common, tally) {
+                if let Some(give) = attempt.at((&pose_at(context, &at, &turn), None), common, tally) {
                     return Ok(give);
                 }
             }
@@ -180,6 +191,53 @@ impl Places {
         reached.insert([giver, taker], nearest);
         Err(REASONS[nearest])
     }
+}
+
+/// How natural orientations are: by the directions in which the hands come, and from the shoulders to the object.
+struct Natural {
+    shoulders: [Point; 2],
+    /// In which the hands come, in the object frame.
+    directions: [Vector; 2],
+}
+
+impl Natural {
+    fn new(context: &Context, pair: [[usize; 2]; 2]) -> Self {
+        Natural {
+            shoulders: pair.map(|[hand, _]| shoulder(context, hand)),
+            directions: pair.map(|[hand, grasp]| context.hands[hand].grasps[grasp].direction),
+        }
+    }
+
+    /// Of an orientation at a place: the larger, the better.
+    fn of(&self, at: &Point, turn: &UnitQuaternion<f64>) -> f64 {
+        let of = |k: usize| {
+            let comes = turn * self.directions[k];
+            (at - self.shoulders[k]).try_normalize(1e-9).map_or(0.0, |towards| towards.dot(&comes))
+        };
+        of(0).min(of(1)) + 0.1 * (of(0) + of(1))
+    }
+
+    /// Indices of turns at a place, the most natural first.
+    fn ranked(&self, at: &Point, turns: &[UnitQuaternion<f64>]) -> Vec<(f64, usize)> {
+        let mut ranked: Vec<(f64, usize)> =
+            turns.iter().enumerate().map(|(index, turn)| (self.of(at, turn), index)).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        ranked
+    }
+}
+
+/// The pose with the object's centre of mass at a point.
+fn pose_at(context: &Context, at: &Point, turn: &UnitQuaternion<f64>) -> Pose {
+    let position = at.coords - turn * context.object.center_of_mass.coords;
+    Pose::from_parts(Translation3::from(position), *turn)
+}
+
+/// Why a pair of grasps fails wherever the object is.
+pub const HANDS_TOUCH: &str = "hands touch";
+
+/// A pair of grasps in which the hands hit each other.
+pub fn hands_touch(pair: [[usize; 2]; 2]) -> Try {
+    Try { reason: HANDS_TOUCH.into(), world_from_object: None, grasps: pair.to_vec(), state: None }
 }
 
 /// True where the hands of two grasps do not hit each other: in the grasps, while the taker comes, and while the giver leaves (Saut
@@ -241,10 +299,8 @@ impl<'c, 'a, 'p> Attempt<'c, 'a, 'p> {
             with_fingers(context, &with_fingers(context, common, giver.0, &giver.1.closed), taker.0, &taker.1.closed);
         self.reached = self.reached.max(1);
         let free = &context.arms_and_torso;
-        let model = self.model.get_or_insert_with(|| {
-            let attached = context.attached(giver.0, &giver.1.object_from_hand.inverse(), &[taker.0]);
-            Rc::new(ArmModel::new(context.robot, &context.covers.links, &[attached], &both, free))
-        });
+        let model =
+            self.model.get_or_insert_with(|| Rc::new(pair_model(context, [self.giver, self.taker], &both, free)));
         let model = Rc::clone(model);
         let arms = [giver.0, taker.0].map(|hand| context.hands[hand].arm_joints.clone());
         let with_second = |first: &Vec<f64>, second: &Vec<f64>| {
@@ -256,22 +312,46 @@ impl<'c, 'a, 'p> Attempt<'c, 'a, 'p> {
         let all: Vec<Vec<f64>> =
             first.iter().flat_map(|first| second.iter().map(|second| with_second(first, second))).collect();
         let free = are_states_free(context, &model, &context.fixed, &all, tally);
-        for at in all.into_iter().zip(free).filter_map(|(at, is_free)| is_free.then_some(at)) {
-            self.reached = self.reached.max(2);
-            let Some(way_in) = self.way(taker, giver, &at, world_from_object, tally) else { continue };
-            self.reached = self.reached.max(3);
-            if !can_close(context, taker.0, [&with_fingers(context, &at, taker.0, &taker.1.open), &at], tally) {
-                continue;
-            }
-            self.reached = self.reached.max(4);
-            if !can_close(context, giver.0, [&at, &with_fingers(context, &at, giver.0, &giver.1.open)], tally) {
-                continue;
-            }
-            self.reached = self.reached.max(5);
-            let Some(way_out) = self.way(giver, taker, &at, world_from_object, tally) else { continue };
-            return Some(Give { giver: self.giver, taker: self.taker, way_in, way_out });
+        for (at, is_free) in all.into_iter().zip(free) {
+            let so_far = match is_free {
+                false => 1,
+                true => match self.ways([giver, taker], &at, world_from_object, tally) {
+                    Ok([way_in, way_out]) => {
+                        return Some(Give { giver: self.giver, taker: self.taker, way_in, way_out });
+                    }
+                    Err(reason) => reason,
+                },
+            };
+            self.reached = self.reached.max(so_far);
+            // Farther than one hand by itself.
+            tally.keep(Stage::Exchange, 2 + so_far, || Try {
+                reason: REASONS[so_far].into(),
+                world_from_object: Some(*world_from_object),
+                grasps: hands.to_vec(),
+                state: Some(at),
+            });
         }
         None
+    }
+
+    /// The taker comes and closes, the giver opens and leaves. Err: index of the reason.
+    fn ways(
+        &mut self,
+        [giver, taker]: [(usize, &Grasp); 2],
+        at: &[f64],
+        world_from_object: &Pose,
+        tally: &mut Tally,
+    ) -> Result<[Smooth; 2], usize> {
+        let context = self.context;
+        let way_in = self.way(taker, giver, at, world_from_object, tally).ok_or(2usize)?;
+        if !can_close(context, taker.0, [&with_fingers(context, at, taker.0, &taker.1.open), at], tally) {
+            return Err(3);
+        }
+        if !can_close(context, giver.0, [at, &with_fingers(context, at, giver.0, &giver.1.open)], tally) {
+            return Err(4);
+        }
+        let way_out = self.way(giver, taker, at, world_from_object, tally).ok_or(5usize)?;
+        Ok([way_in, way_out])
     }
 
     /// The straight way of one open hand from the object, while the other one holds it. It ends where searches for motions may begin.
@@ -304,6 +384,13 @@ impl<'c, 'a, 'p> Attempt<'c, 'a, 'p> {
             is_way_free(context, (&open.alone, hand), world_from_object, &timed, tally).then_some(way)
         })
     }
+}
+
+/// The robot with both hands at the object, coordinates `free`, all others as in `state`.
+pub fn pair_model(context: &Context, [giver, taker]: [[usize; 2]; 2], state: &[f64], free: &[usize]) -> ArmModel {
+    let hand_from_object = context.hands[giver[0]].grasps[giver[1]].object_from_hand.inverse();
+    let attached = context.attached(giver[0], &hand_from_object, &[taker[0]]);
+    ArmModel::new(context.robot, &context.covers.links, &[attached], state, free)
 }
 
 /// A robot with one hand open.

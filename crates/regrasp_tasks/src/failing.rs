@@ -1,5 +1,6 @@
 //! Why there is no plan.
 
+use regrasp_geometry::Pose;
 use regrasp_manipulation::failure::{Cause, Failure, FailureKind};
 use regrasp_plan::robot_plan::RobotStatistics;
 use std::collections::BTreeMap;
@@ -38,6 +39,22 @@ impl Stage {
     }
 }
 
+/// Something that was tried and failed, to be looked at again where no plan is found.
+#[derive(Debug, Clone)]
+pub struct Try {
+    /// Why it failed.
+    pub reason: String,
+    /// Pose of the object; none where the same fails wherever it is.
+    pub world_from_object: Option<Pose>,
+    /// Hands at the object, each with the index of its grasp. At an exchange the giver first.
+    pub grasps: Vec<[usize; 2]>,
+    /// The robot, fingers as in the grasps. None where no arm was looked at, or one does not get there.
+    pub state: Option<Vec<f64>>,
+}
+
+/// Most tries of a stage that are kept of those that came equally far.
+const MOST_TRIES: usize = 16;
+
 /// Counts of a search.
 #[derive(Debug, Default)]
 pub struct Tally {
@@ -51,6 +68,8 @@ pub struct Tally {
     pub reasons: BTreeMap<(Stage, String), u64>,
     /// The nearest miss by stage: how far, and in words.
     pub nearest: BTreeMap<Stage, (f64, String)>,
+    /// By stage and how far they came, the larger the nearer to success: the first tries that failed.
+    pub tries: BTreeMap<(Stage, usize), Vec<Try>>,
 }
 
 impl Tally {
@@ -68,6 +87,29 @@ impl Tally {
         if self.nearest.get(&stage).is_none_or(|nearest| by < nearest.0) {
             self.nearest.insert(stage, (by, words()));
         }
+    }
+
+    /// Keeps something that failed and came so far: the larger, the nearer to success.
+    pub fn keep(&mut self, stage: Stage, so_far: usize, made: impl FnOnce() -> Try) {
+        let tries = self.tries.entry((stage, so_far)).or_default();
+        if tries.len() < MOST_TRIES {
+            tries.push(made());
+        }
+    }
+
+    /// The tries that tell most about a stage: those that came nearest where nothing worked there, else those that failed for the
+    /// commonest reason.
+    pub fn telling_tries(&self, stage: Stage) -> &[Try] {
+        let own = self.tries.range((stage, 0)..=(stage, usize::MAX)).map(|(_, tries)| tries);
+        let count = |tries: &Vec<Try>| {
+            let reason = tries.first().map_or_else(String::new, |tried| tried.reason.clone());
+            self.reasons.get(&(stage, reason)).copied().unwrap_or_default()
+        };
+        let chosen = match self.found.contains_key(&stage) {
+            true => own.max_by_key(|tries| count(tries)),
+            false => own.last(),
+        };
+        chosen.map_or(&[], Vec::as_slice)
     }
 
     /// One configuration was looked at.
@@ -107,19 +149,28 @@ impl Tally {
         format!("{tried} tried, {}{nearest}", parts.join(", "))
     }
 
-    /// No plan: the first stage at which nothing worked says why.
-    pub fn failure(&self, kind: FailureKind) -> Failure {
+    /// The first stage at which nothing worked.
+    fn failing_stage(&self) -> Stage {
         let order =
             [Stage::Grasp, Stage::Place, Stage::Exchange, Stage::PutDown, Stage::InHand, Stage::Transit, Stage::Carry];
         let is_empty = |stage: &Stage| self.tried.contains_key(stage) && !self.found.contains_key(stage);
         let last = || order.into_iter().rev().find(|stage| self.reasons.keys().any(|(of, _)| of == stage));
-        let stage = order.into_iter().find(is_empty).or_else(last).unwrap_or(Stage::Grasp);
+        order.into_iter().find(is_empty).or_else(last).unwrap_or(Stage::Grasp)
+    }
+
+    /// The stages that a failure names.
+    pub fn failing_stages(&self) -> Vec<Stage> {
         // A change of grasp in a hand is tried only because exchanges failed: those come first.
         let have_exchanges_failed = self.reasons.keys().any(|(of, _)| *of == Stage::Exchange);
-        let stages = match stage {
+        match self.failing_stage() {
             Stage::InHand if have_exchanges_failed => vec![Stage::Exchange, Stage::InHand],
             stage => vec![stage],
-        };
+        }
+    }
+
+    /// No plan: the first stage at which nothing worked says why.
+    pub fn failure(&self, kind: FailureKind) -> Failure {
+        let stages = self.failing_stages();
         let parts = stages.iter().map(|stage| format!("{}: {}", stage.name(), self.in_words(*stage)));
         let (stage, message) = (stages[0], parts.collect::<Vec<_>>().join("; "));
         let advice = match stage {

@@ -3,14 +3,15 @@
 mod cheapest;
 
 use crate::context::Context;
-use crate::exchange::{Give, Places, is_double_grasp};
+use crate::exchange::{Give, HANDS_TOUCH, Places, hands_touch, is_double_grasp};
 use crate::failing::{Stage, Tally};
 use crate::forces;
 use crate::in_hand::{self, Change};
+use crate::miss::with_nearest;
 use crate::motions::{self, Made, Step, Stuck};
 use crate::placements::{Place, intermediate};
 use crate::roadmap::{TaskAnswer, TaskRoadmap};
-use crate::station::{Effort, HAND_COLLIDES, Station, may_hold, station};
+use crate::station::{Effort, HAND_COLLIDES, Station, TOO_HEAVY, failed_try, may_hold, station};
 use regrasp_geometry::Vector;
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::task_settings::TaskCost;
@@ -137,9 +138,17 @@ struct Graph<'c, 'a> {
     n_looked: usize,
 }
 
-/// The cheapest plan that holds what it promises, and what the roadmap did not have.
+/// The cheapest plan that holds what it promises, and what the roadmap did not have. Errors: with the nearest miss.
 pub fn search(context: &Context, roadmap: Option<&TaskRoadmap>, tally: &mut Tally) -> Result<TaskAnswer, Failure> {
     let mut graph = Graph::new(context, roadmap);
+    plan_in(&mut graph, tally).map_err(|failure| match failure.kind {
+        FailureKind::Interrupted => failure,
+        _ => with_nearest(failure, context, tally, &graph.exchange),
+    })
+}
+
+fn plan_in(graph: &mut Graph, tally: &mut Tally) -> Result<TaskAnswer, Failure> {
+    let (context, roadmap) = (graph.context, graph.roadmap);
     let roads = roadmap.and_then(|roadmap| roadmap.roads.as_ref());
     let mut attempt = 0;
     loop {
@@ -357,7 +366,8 @@ impl<'c, 'a> Graph<'c, 'a> {
             given.known = match is_apart {
                 true => Known::Likely,
                 false => {
-                    tally.count(Stage::Exchange, Err("hands touch"));
+                    tally.count(Stage::Exchange, Err(HANDS_TOUCH));
+                    tally.keep(Stage::Exchange, 0, || hands_touch([giver, taker]));
                     Known::Dead
                 }
             };
@@ -373,10 +383,8 @@ impl<'c, 'a> Graph<'c, 'a> {
             tally.work(1);
             let own = &self.context.hands[hand].grasps[grasp];
             let at = &self.places[place];
-            let found = may_hold(self.context, at, hand, own).and_then(|()| {
-                forces::strain(self.context, hand, own, &at.world_from_object)
-                    .ok_or("grasps that do not hold the weight")
-            });
+            let found = may_hold(self.context, at, hand, own)
+                .and_then(|()| forces::strain(self.context, hand, own, &at.world_from_object).ok_or(TOO_HEAVY));
             match found {
                 Ok(strain) => {
                     let dearer = STRAIN * (strain - EASY).max(0.0);
@@ -387,6 +395,7 @@ impl<'c, 'a> Graph<'c, 'a> {
                 }
                 Err(reason) => {
                     tally.count(stage, Err(reason));
+                    tally.keep(stage, 0, || failed_try(at, [hand, grasp], reason, None));
                     grip.known = Known::Dead;
                 }
             }

@@ -2,7 +2,7 @@
 
 use crate::context::Context;
 use crate::exchange::{Places, turns};
-use crate::failing::{Stage, Tally};
+use crate::failing::{Stage, Tally, Try};
 use crate::forces;
 use crate::line::is_state_free;
 use crate::station::{arm_postures, with_fingers};
@@ -84,23 +84,46 @@ pub fn change(
             continue;
         };
         tried.push(turn);
+        let failed = |tally: &mut Tally, reason: &str| {
+            let so_far = rank(reason);
+            tally.keep(Stage::InHand, so_far, || Try {
+                reason: reason.into(),
+                world_from_object: Some(pose),
+                grasps: vec![[hand, from]],
+                state: Some(at.clone()),
+            });
+        };
         reason = nearer(reason, "that do not hold the weight");
         if grasps.iter().any(|grasp| !forces::holds(context, hand, grasp, &pose)) {
+            failed(tally, reason);
             continue;
         }
         reason = nearer(reason, "without a motion in the hand");
         if let Some(plan) = search(context, [hand, from, to], (&at, &pose), tally) {
             return Ok(Change { from: [hand, from], to: [hand, to], at, plan });
         }
+        failed(tally, reason);
+    }
+    if tried.is_empty() {
+        tally.keep(Stage::InHand, 0, || Try {
+            reason: reason.into(),
+            world_from_object: None,
+            grasps: vec![[hand, from]],
+            state: None,
+        });
     }
     Err(reason)
 }
 
 /// The reason that is nearer to success.
 fn nearer(old: &'static str, new: &'static str) -> &'static str {
-    const ORDER: [&str; 3] = ["out of reach", "that do not hold the weight", "without a motion in the hand"];
-    let rank = |reason: &str| ORDER.iter().position(|other| *other == reason).unwrap_or(0);
     if rank(new) > rank(old) { new } else { old }
+}
+
+/// How near to success a reason is.
+fn rank(reason: &str) -> usize {
+    const ORDER: [&str; 3] = ["out of reach", "that do not hold the weight", "without a motion in the hand"];
+    ORDER.iter().position(|other| *other == reason).unwrap_or(0)
 }
 
 /// A free posture with the object in a grasp, its centre of mass at a point.

@@ -22,6 +22,8 @@ mod graph;
 mod in_hand;
 /// Straight ways of a hand.
 mod line;
+/// The nearest miss as a posture.
+mod miss;
 /// The motions of a plan.
 mod motions;
 /// Where the object may lie.

@@ -85,6 +85,20 @@ pub fn is_way_free(
     timed: &TimedPath,
     tally: &mut Tally,
 ) -> bool {
+    let alone = World::default().with(&context.alone, world_from_object);
+    let mut tests = way_colliders(context, (model, hand), &alone);
+    let is_free = tests.iter_mut().all(|test| is_free(test, timed));
+    tests.iter().for_each(|test| count(test, tally));
+    is_free
+}
+
+/// The tests of such a way: what the arm moves against what rests and the robot; all of it but the hand against the object, which is all
+/// of `alone`.
+pub fn way_colliders<'c>(
+    context: &'c Context,
+    (model, hand): (&'c ArmModel, usize),
+    alone: &'c World,
+) -> [Collider<'c>; 2] {
     let mounted = Part::Hand(context.hands[hand].mounted);
     // All else rests, where it was free.
     let arm: Vec<usize> = (0..model.dimension())
@@ -93,13 +107,9 @@ pub fn is_way_free(
     let moves = |body: usize| model.is_moved_by(body, &arm);
     let mut robot = collider(context, model, &context.fixed);
     robot.only(moves, |[a, b]| moves(a) || moves(b));
-    let alone = World::default().with(&context.alone, world_from_object);
-    let mut others = collider(context, model, &alone);
+    let mut others = collider(context, model, alone);
     others.only(|body| moves(body) && context.robot.part_of(model.bodies[body].link) != mounted, |_| false);
-    let is_free = is_free(&mut robot, timed) && is_free(&mut others, timed);
-    count(&robot, tally);
-    count(&others, tally);
-    is_free
+    [robot, others]
 }
 
 /// The same where what is carried may touch what stands in `world` but not in `without`.
@@ -110,15 +120,24 @@ pub fn is_lift_free(
     timed: &TimedPath,
     tally: &mut Tally,
 ) -> bool {
+    let mut tests = lift_colliders(context, model, [world, without]);
+    let is_free = tests.iter_mut().all(|test| is_free(test, timed));
+    tests.iter().for_each(|test| count(test, tally));
+    is_free
+}
+
+/// The tests of such a motion: the robot in `world`, and what it carries in `without`.
+pub fn lift_colliders<'c>(
+    context: &Context,
+    model: &'c ArmModel,
+    [world, without]: [&'c World; 2],
+) -> [Collider<'c>; 2] {
     let is_carried = |body: usize| model.bodies[body].attached.is_some();
     let mut robot = collider(context, model, world);
     robot.only(|body| !is_carried(body), |_| true);
     let mut object = collider(context, model, without);
     object.only(is_carried, |_| false);
-    let is_free = is_free(&mut robot, timed) && is_free(&mut object, timed);
-    count(&robot, tally);
-    count(&object, tally);
-    is_free
+    [robot, object]
 }
 
 fn is_free(collider: &mut Collider, timed: &TimedPath) -> bool {

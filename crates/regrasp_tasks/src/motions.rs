@@ -2,7 +2,7 @@
 
 use crate::context::{Context, Grasp, motion_of};
 use crate::exchange::Give;
-use crate::failing::{Stage, Tally};
+use crate::failing::{Stage, Tally, Try};
 use crate::forces::{Carried, Off, under, weight};
 use crate::in_hand::{self, Change};
 use crate::line::{LINE_STEPS, is_lift_free, is_motion_free};
@@ -228,6 +228,14 @@ impl<'c, 'a> Maker<'c, 'a> {
             }
             Err(failure) => {
                 let is_cut = matches!(failure.kind, FailureKind::TimeLimit | FailureKind::Interrupted);
+                tally.keep(stage, 0, || Try {
+                    reason: failure.message.clone(),
+                    world_from_object: Some(
+                        carried.map_or(self.object, |carried| carried.world_from_object(context, to)),
+                    ),
+                    grasps: carried.and_then(|carried| index_of(context, carried)).into_iter().collect(),
+                    state: Some(to.to_vec()),
+                });
                 tally.work(failure.statistics.work.max(1000));
                 Err(Stuck {
                     stage,
@@ -516,4 +524,10 @@ impl<'c, 'a> Maker<'c, 'a> {
         let support = support.and_then(|names| names.into_iter().next()).unwrap_or_default();
         self.transit(&context.query.end, &world, &support, tally)
     }
+}
+
+/// The hand that carries, and the index of its grasp.
+fn index_of(context: &Context, carried: &Carried) -> Option<[usize; 2]> {
+    let grasps = &context.hands[carried.hand].grasps;
+    Some([carried.hand, grasps.iter().position(|grasp| std::ptr::eq(grasp, carried.grasp))?])
 }

@@ -3,7 +3,7 @@
 pub use crate::clear::with_fingers;
 use crate::clear::{is_hand_clear, links_of};
 use crate::context::{Context, Grasp};
-use crate::failing::{Stage, Tally};
+use crate::failing::{Stage, Tally, Try};
 use crate::forces;
 use crate::line::{LINE_STEPS, are_states_free, is_lift_free, is_motion_free, is_state_free, is_way_free, straight};
 use crate::placements::{Place, stable_pose};
@@ -18,12 +18,17 @@ const POSTURES: usize = 4;
 const MORE_POSTURES: usize = 24;
 /// So many times as many postures of the common joints are drawn where nothing else is left.
 const MORE_DRAWS: usize = 8;
+/// Reasons for which no posture is looked at.
+const BELOW_SUPPORT: &str = "hands below the support";
+/// The fingers do not hold the weight.
+pub const TOO_HEAVY: &str = "grasps that do not hold the weight";
+const OUT_OF_REACH: &str = "out of reach";
 /// A reason that more postures do not change.
 pub const HAND_COLLIDES: &str = "hands in collision";
 /// Shares of the way in that are tried. A shorter one is planned before.
-const WAY_SHARES: [f64; 2] = [1.0, 0.4];
+pub const WAY_SHARES: [f64; 2] = [1.0, 0.4];
 /// Shares of the lift that are tried.
-const LIFT_SHARES: [f64; 2] = [1.0, 1.0 / 3.0];
+pub const LIFT_SHARES: [f64; 2] = [1.0, 1.0 / 3.0];
 /// Steps in time of fingers that open or close.
 pub const FINGER_STEPS: usize = 8;
 
@@ -52,10 +57,10 @@ pub struct Station {
 /// Tests that need neither kinematics nor collision. Err with a reason.
 pub fn may_hold(context: &Context, place: &Place, hand: usize, grasp: &Grasp) -> Result<(), &'static str> {
     if stable_pose(context, hand, &place.world_from_object).is_some_and(|pose| !grasp.stable_poses.contains(&pose)) {
-        return Err("hands below the support");
+        return Err(BELOW_SUPPORT);
     }
     if !forces::holds(context, hand, grasp, &place.world_from_object) {
-        return Err("grasps that do not hold the weight");
+        return Err(TOO_HEAVY);
     }
     Ok(())
 }
@@ -136,6 +141,9 @@ pub fn station(
 ) -> Result<Station, &'static str> {
     let own = &context.hands[hand].grasps[grasp];
     let park = &context.query.start;
+    let failed = |tally: &mut Tally, reason: &str, state: Option<&Vec<f64>>| {
+        tally.keep(stage, rank(reason), || failed_try(place, [hand, grasp], reason, state));
+    };
     let world_from_hand = place.world_from_object * own.object_from_hand;
     let hand_from_object = own.object_from_hand.inverse();
     let closed = with_fingers(context, park, hand, &own.closed);
@@ -143,13 +151,14 @@ pub fn station(
     let free = &context.arms_and_torso;
     let hands = [&own.closed, &own.open].map(|fingers| links_of(context, hand, fingers));
     if !hands.iter().all(|links| is_hand_clear(context, links, &world_from_hand)) {
+        failed(tally, HAND_COLLIDES, None);
         return Err(HAND_COLLIDES);
     }
     let (n_postures, n_draws) = match effort {
         Effort::Little => (POSTURES, context.settings.common_draws),
         Effort::Full => (MORE_POSTURES, context.settings.common_draws * MORE_DRAWS),
     };
-    let (models, mut reason) = ([const { OnceCell::new() }; 3], "out of reach");
+    let (models, mut reason) = ([const { OnceCell::new() }; 3], OUT_OF_REACH);
     let states = [(&closed, None), (&open, None), (&closed, Some((hand, &hand_from_object)))];
     // Made when they are needed.
     let model = |k: usize| models[k].get_or_init(|| context.model(states[k].0, free, states[k].1));
@@ -161,12 +170,17 @@ pub fn station(
             Ok(postures) => postures,
             Err((by, words)) => {
                 tally.miss(stage, by, || words);
+                failed(tally, OUT_OF_REACH, None);
                 continue;
             }
         };
         reason = worse(reason, "in collision");
         let free = are_states_free(context, model(0), &context.fixed, &postures, tally);
-        for at in postures.into_iter().zip(free).filter_map(|(at, is_free)| is_free.then_some(at)) {
+        for (at, is_free) in postures.into_iter().zip(free) {
+            if !is_free {
+                failed(tally, "in collision", Some(&at));
+                continue;
+            }
             reason = worse(reason, "without a way in");
             let direction = place.world_from_object.rotation * own.direction;
             let opened = with_fingers(context, &at, hand, &own.open);
@@ -175,9 +189,13 @@ pub fn station(
                 let timed = way.timed(&context.limits, 1.0, LINE_STEPS);
                 is_way_free(context, (model(1), hand), &place.world_from_object, &timed, tally).then_some(way)
             });
-            let Some(way) = way else { continue };
+            let Some(way) = way else {
+                failed(tally, "without a way in", Some(&at));
+                continue;
+            };
             reason = worse(reason, "with fingers that cannot close");
             if !can_close(context, hand, [&opened, &at], tally) {
+                failed(tally, "with fingers that cannot close", Some(&at));
                 continue;
             }
             reason = worse(reason, "without a way up");
@@ -192,6 +210,7 @@ pub fn station(
             if let Some(lift) = lift {
                 return Ok(Station { hand, grasp, way, lift });
             }
+            failed(tally, "without a way up", Some(&at));
         }
     }
     Err(reason)
@@ -199,10 +218,32 @@ pub fn station(
 
 /// The reason that is nearer to success.
 fn worse(old: &'static str, new: &'static str) -> &'static str {
-    const ORDER: [&str; 5] =
-        ["out of reach", "in collision", "without a way in", "with fingers that cannot close", "without a way up"];
-    let rank = |reason: &str| ORDER.iter().position(|other| *other == reason).unwrap_or(0);
     if rank(new) > rank(old) { new } else { old }
+}
+
+/// How near to success a reason is.
+fn rank(reason: &str) -> usize {
+    const ORDER: [&str; 8] = [
+        BELOW_SUPPORT,
+        TOO_HEAVY,
+        OUT_OF_REACH,
+        HAND_COLLIDES,
+        "in collision",
+        "without a way in",
+        "with fingers that cannot close",
+        "without a way up",
+    ];
+    ORDER.iter().position(|other| *other == reason).unwrap_or(0)
+}
+
+/// A grasp at a place that failed.
+pub fn failed_try(place: &Place, own: [usize; 2], reason: &str, state: Option<&Vec<f64>>) -> Try {
+    Try {
+        reason: reason.to_owned(),
+        world_from_object: Some(place.world_from_object),
+        grasps: vec![own],
+        state: state.cloned(),
+    }
 }
 
 /// True where the fingers get from the first state to the second one.

@@ -10,6 +10,7 @@ use regrasp_geometry::collision::{Placement, gap_along};
 use regrasp_geometry::{Shape, Vector};
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::motion_settings::MotionSettings;
+use regrasp_manipulation::robot_miss::{Meeting, MetBody, MetKind, RobotMiss};
 
 /// An end of a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,7 +50,7 @@ impl Problem<'_> {
     pub fn collision(&self, model: &ArmModel, configuration: &[f64], settings: &MotionSettings) -> Option<[String; 2]> {
         let collider = ColliderSettings { clearance: settings.clearance, ..ColliderSettings::default() };
         let contact = Collider::new(model, &self.world, collider).contact(configuration)?;
-        Some(names(model, &self.world, contact))
+        Some(met(model, &self.world, contact).map(|body| body.name))
     }
 
     /// Refuses a configuration outside limits or in collision.
@@ -71,10 +72,9 @@ impl Problem<'_> {
         }
         let collider = ColliderSettings { clearance: settings.clearance, ..ColliderSettings::default() };
         let mut collider = Collider::new(model, &self.world, collider);
-        let Some(contact) = collider.contact(configuration) else { return Ok(()) };
-        let [first, second] = names(model, &self.world, contact);
-        let depth = depth(&mut collider, configuration, contact);
-        let how = match depth {
+        let Some(meeting) = meeting(&mut collider, configuration) else { return Ok(()) };
+        let [first, second] = [0, 1].map(|k| meeting.bodies[k].name.clone());
+        let how = match meeting.overlap {
             Some(depth) if depth > 0.0 => format!("they overlap by up to {:.1} mm", 1e3 * depth),
             Some(depth) => format!(
                 "they are {:.2} mm apart, and the clearance is {:.2} mm",
@@ -88,17 +88,32 @@ impl Problem<'_> {
             Some(free) => format!("the nearest free posture found: {}", changes(model, configuration, &free)),
             None => "no free posture was found near by: move the obstacle or choose another posture".to_owned(),
         };
-        Err(Failure::bare(end.kind(), message, &advice))
+        let mut failure = Failure::bare(end.kind(), message, &advice);
+        let mut miss = RobotMiss::at(format!("{}: in collision", end.name()), model.state_at(configuration));
+        miss.meeting = Some(meeting);
+        failure.robot_miss = Some(Box::new(miss));
+        Err(failure)
     }
 }
 
-/// Names of the two that meet.
-fn names(model: &ArmModel, world: &World, contact: Contact) -> [String; 2] {
-    let partner = match contact.partner {
-        Partner::Obstacle(obstacle) => world.obstacles[obstacle].name.clone(),
-        Partner::Body(body) => model.bodies[body].name.clone(),
+/// The first two that are not proved to keep the clearance in a configuration, and how deep they overlap. None where all do.
+pub fn meeting(collider: &mut Collider, configuration: &[f64]) -> Option<Meeting> {
+    let contact = collider.contact(configuration)?;
+    let bodies = met(collider.model, collider.world, contact);
+    Some(Meeting { bodies, overlap: depth(collider, configuration, contact) })
+}
+
+/// The two that meet.
+fn met(model: &ArmModel, world: &World, contact: Contact) -> [MetBody; 2] {
+    let of_model = |body: usize| MetBody {
+        name: model.bodies[body].name.clone(),
+        kind: if model.bodies[body].attached.is_some() { MetKind::Carried } else { MetKind::Link },
     };
-    [model.bodies[contact.body].name.clone(), partner]
+    let partner = match contact.partner {
+        Partner::Obstacle(obstacle) => MetBody { name: world.obstacles[obstacle].name.clone(), kind: MetKind::Resting },
+        Partner::Body(body) => of_model(body),
+    };
+    [of_model(contact.body), partner]
 }
 
 /// The joints that change most.

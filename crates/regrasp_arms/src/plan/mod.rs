@@ -19,6 +19,7 @@ mod wrists;
 
 use crate::roadmap::Roads;
 use crate::world::World;
+pub use ends::meeting;
 use execute::execute;
 pub use execute::limits;
 pub use graph::{build_graph, graph_differs, grow_graph};

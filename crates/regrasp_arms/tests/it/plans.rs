@@ -30,6 +30,7 @@ name = "lamp"
 cylinder = { radius = 0.03, length = 0.6 }
 position = [LAMP]
 
+OBSTACLES
 [[tasks]]
 task = "motion"
 start = { joints = { torso_yaw = -0.6 } }
@@ -37,8 +38,13 @@ goal = { joints = { torso_yaw = 0.6, right_elbow = -0.9 } }
 "#;
 
 fn load(name: &str, lamp: &str) -> LoadedScene {
+    load_among(name, lamp, "")
+}
+
+fn load_among(name: &str, lamp: &str, obstacles: &str) -> LoadedScene {
     let robot = repository().join("assets/robots/two_arms/robot.toml");
-    let text = SCENE.replace("ROBOT", &robot.display().to_string()).replace("LAMP", lamp);
+    let text =
+        SCENE.replace("ROBOT", &robot.display().to_string()).replace("LAMP", lamp).replace("OBSTACLES", obstacles);
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
     let path = folder.join(format!("motion_{name}.toml"));
     std::fs::write(&path, text).unwrap();
@@ -88,15 +94,24 @@ fn a_start_in_collision_is_refused_with_the_pair_and_a_free_posture() {
 
 #[test]
 fn what_a_graph_lacked_is_found_once() {
-    let loaded = load("grown", "0.75, 0.0, 0.45");
+    // Posts between which the arms have to find their way.
+    let posts: String = [[0.45, 0.25], [0.45, -0.25], [0.6, 0.5], [0.6, -0.5], [0.3, 0.6], [0.3, -0.6]]
+        .iter()
+        .enumerate()
+        .map(|(k, [x, y])| {
+            format!(
+                "[[obstacles]]\nname = \"post {k}\"\ncylinder = {{ radius = 0.03, length = 1.6 }}\nposition = [{x}, {y}, 0.8]\n\n"
+            )
+        })
+        .collect();
+    let loaded = load_among("grown", "0.75, 0.0, 0.45", &posts);
     let world = (&loaded.scene, &loaded.state);
     let mut query = query(&loaded);
     let of_graph = BuildSettings { nodes_per_arm: 2, ..BuildSettings::default() };
     let mut roads = Roads::new(build_graph(world, &query, &of_graph, 1).unwrap());
-    // Nothing is easy: each motion is asked of the graph first.
     let settings = MotionSettings::default();
     let (mut n_new, mut n_known) = (0, 0);
-    for goal in 0..12 {
+    for goal in 0..40 {
         let mut rng = Rng::keyed(goal, "goal", 0);
         let robot = &loaded.scene.robots[query.robot];
         let MotionGoal::Joints(joints) = &mut query.goal else { panic!("joints") };
@@ -121,6 +136,5 @@ fn what_a_graph_lacked_is_found_once() {
         assert!(report.accepted(), "{:?}", report.violations);
         n_known += usize::from(second.new_way.is_none());
     }
-    println!("{n_new} {n_known}");
     assert!(n_new >= 2 && n_known == n_new, "{n_known} of {n_new}");
 }

@@ -1,17 +1,19 @@
 //! Motions of whole robots: what the commands `plan`, `check` and `export` do with tasks of kind `motion` and their plans.
 
 use crate::args::{self, Common};
+use crate::commands::robot_roadmap::Grown;
 use crate::commands::written::{self, Limits, available_threads};
-use crate::commands::{robot_roadmap, task_grasps};
+use crate::commands::{pictures, robot_roadmap, task_grasps};
 use crate::judge;
 use crate::load;
 use crate::outputs::Outputs;
+use crate::pages;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
 use regrasp::base::{Diagnostic, Place, files};
 use regrasp::geometry::frame::rotation_between;
-use regrasp::plan::check::{find_scene_among, robot_along};
+use regrasp::plan::check::{Report, RobotAlong, find_scene_among, robot_along};
 use regrasp::plan::format;
 use regrasp::planners::FailureKind;
 use regrasp::robot_roadmap::{Asked, RobotAnswer};
@@ -24,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Plans the motion of the first task, judges it and writes it.
+/// Plans the motion of the first task, judges it and writes it; a page and pictures of a failure where they are asked for.
 pub fn plan(
     arguments: &args::Plan,
     common: &Common,
@@ -35,6 +37,25 @@ pub fn plan(
 ) -> Result<(), Stop> {
     refuse_in_hand_arguments(arguments)?;
     say_query(loaded, query, arguments.seed, talk);
+    let found = search(arguments, common, loaded, query, limits, talk);
+    if let Err(Stop::NoRobotPlan(failure) | Stop::NoGrasp(failure)) = &found {
+        let asked = (arguments.failure.as_deref(), arguments.report.as_deref());
+        pictures::write_robot_failure(asked, loaded, query, failure, talk)?;
+    }
+    let (plan, grown) = found?;
+    write(&plan, arguments, &arguments.judging.after_search(limits.time_limit), common, talk)?;
+    grown.map_or(Ok(()), |grown| grown.save(talk))
+}
+
+/// The plan, with what is said of it, and the roadmap that grew by it where that is asked for.
+fn search(
+    arguments: &args::Plan,
+    common: &Common,
+    loaded: &LoadedScene,
+    query: &Query,
+    limits: &Limits,
+    talk: &Talk,
+) -> Result<(RobotPlan, Option<Grown>), Stop> {
     let started = Instant::now();
     let budget = Budget {
         max_work: limits.max_work,
@@ -86,11 +107,11 @@ pub fn plan(
         duration(seconds),
     ));
     talk.event("plan", json!({ "seconds": seconds, "statistics": plan.statistics, "duration": plan.duration() }));
-    write(&plan, arguments, &arguments.judging.after_search(limits.time_limit), common, talk)?;
-    match (roadmap, answer) {
-        (Some(known), Some(answer)) if arguments.grow => robot_roadmap::grow(&known, with, &answer, talk),
-        _ => Ok(()),
-    }
+    let grown = match (roadmap, answer) {
+        (Some(known), Some(answer)) if arguments.grow => Some(Grown::by(known, with, &answer)?),
+        _ => None,
+    };
+    Ok((*plan, grown))
 }
 
 /// Arguments that have no meaning for a robot that moves (`A507`).
@@ -99,8 +120,6 @@ fn refuse_in_hand_arguments(arguments: &args::Plan) -> Result<(), Stop> {
         ("--margin", arguments.search.margin.is_some()),
         ("--improve", arguments.search.improve.is_some()),
         ("--improve-work", arguments.search.improve_work.is_some()),
-        ("--report", arguments.report.is_some()),
-        ("--failure", arguments.failure.is_some()),
         ("--hold", arguments.judging.hold),
     ];
     match given.into_iter().find(|(_, is_given)| *is_given) {
@@ -125,7 +144,14 @@ fn write(
     let read = format::robot_from_json(plan_path, bytes.as_bytes())
         .map_err(|error| Stop::Internal(format!("a plan just made is not a plan file: {error}")))?;
     let again = load::motion_scene(&arguments.scene, &read.query, common)?;
-    let report = judge::judge_robot(&judging.scene(again), &read, judging, talk);
+    let again = judging.scene(again);
+    let report = judge::judge_robot(&again, &read, judging, talk);
+    if let Some(page) = &arguments.report {
+        let problem = |problem: String| Stop::Internal(format!("a plan just made cannot be drawn: {problem}"));
+        let along = robot_along((&again.scene, &again.state), &read, MOMENTS).map_err(problem)?;
+        let html = robot_page(&telling((&again, &read), (&report, &along), None), &RobotStoryboard::default());
+        pages::write_html(page, &html.map_err(problem)?, talk)?;
+    }
     if !report.accepted() {
         return Err(written::rejected(output, &bytes, talk));
     }
@@ -209,6 +235,14 @@ pub fn check(
     if report.accepted() { Ok(()) } else { Err(Stop::Rejected) }
 }
 
+fn telling<'a>(
+    (loaded, plan): (&'a LoadedScene, &'a RobotPlan),
+    (report, along): (&'a Report, &'a RobotAlong),
+    title: Option<&'a str>,
+) -> RobotTelling<'a> {
+    RobotTelling { scene: &loaded.scene, state: &loaded.state, plan, report, along, title }
+}
+
 /// Moments of the chart of clearance.
 const MOMENTS: usize = 400;
 
@@ -229,14 +263,7 @@ pub fn view(arguments: &args::View, bytes: &[u8], written: &Outputs, common: &Co
     let report = judge::judge_robot(&loaded, &plan, &arguments.judging, talk);
     let unfit = |problem: String| Stop::BadInput(Diagnostic::new("C408", Place::file(&arguments.plan), problem).into());
     let along = robot_along((&loaded.scene, &loaded.state), &plan, MOMENTS).map_err(unfit)?;
-    let telling = RobotTelling {
-        scene: &loaded.scene,
-        state: &loaded.state,
-        plan: &plan,
-        report: &report,
-        along: &along,
-        title: arguments.title.as_deref(),
-    };
+    let telling = telling((&loaded, &plan), (&report, &along), arguments.title.as_deref());
     let settings = RobotStoryboard { frames: arguments.frames, width: arguments.width, columns: arguments.columns };
     let put = |path: &Path, bytes: &[u8]| -> Result<(), Stop> {
         files::write_atomic(path, bytes).map_err(|error| Stop::unwritable(path, &error))?;

@@ -3,11 +3,15 @@
 use super::rows::make_folder_of;
 use crate::args;
 use crate::outputs::Output;
+use crate::pages;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::grouped;
 use regrasp::base::{Diagnostic, Place, files};
-use regrasp::pictures::{failure_story, reached_story};
+use regrasp::pictures::{failure_facts, failure_story, reached_story, robot_failure};
+use regrasp::scene::LoadedScene;
+use regrasp::viewer::render::png_file;
+use regrasp::viewer::robots::{robot_failure_page, robot_failure_picture};
 use regrasp::viewer::story::{RoadmapStory, Story};
 use regrasp::viewer::storyboard::{StoryboardError, StoryboardSettings, storyboard};
 use regrasp::viewer::{charts, roadmap_picture::roadmap_picture};
@@ -15,8 +19,8 @@ use regrasp::{Failure, Query};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Names of the pictures of a failure.
-pub const OF_FAILURE: [&str; 2] = ["causes.svg", "reached.svg"];
+/// Names of the pictures of a failure: the causes; what the search of one hand had reached; the nearest miss of a robot in its scene.
+pub const OF_FAILURE: [&str; 3] = ["causes.svg", "reached.svg", "scene.png"];
 /// Name of the picture of a graph in a folder of charts.
 const OF_ROADMAP: &str = "roadmap.svg";
 
@@ -85,6 +89,33 @@ pub fn write_failure(folder: &Path, failure: &Failure, query: &Query, talk: &Tal
     if let Some(reached) = reached_story(failure, query.goal()) {
         let picture = roadmap_picture(&reached, "Grasps that the search reached");
         put(&folder.join(OF_FAILURE[1]), picture.as_bytes(), talk)?;
+    }
+    Ok(())
+}
+
+/// Writes what there is to be seen of a failed task of a whole robot into a folder and onto a page, where they are asked for: the nearest
+/// miss in its scene, and the causes as bars.
+pub fn write_robot_failure(
+    (folder, page): (Option<&Path>, Option<&Path>),
+    loaded: &LoadedScene,
+    query: &Query,
+    failure: &Failure,
+    talk: &Talk,
+) -> Result<(), Stop> {
+    let story = failure_story(failure);
+    let around = (&loaded.scene, &loaded.state);
+    let Some(drawn) = robot_failure(around, query, failure, &story) else { return Ok(()) };
+    if let Some(page) = page {
+        let html = robot_failure_page(&drawn, &failure_facts(failure), &loaded.scene.name).map_err(Stop::Internal)?;
+        pages::write_html(page, &html, talk)?;
+    }
+    if let Some(folder) = folder {
+        std::fs::create_dir_all(folder).map_err(|error| Stop::unwritable(folder, &error))?;
+        if let Some(chart) = charts::causes(&story) {
+            put(&folder.join(OF_FAILURE[0]), chart.as_bytes(), talk)?;
+        }
+        let picture = robot_failure_picture(&drawn).map_err(Stop::Internal)?;
+        put(&folder.join(OF_FAILURE[2]), &png_file::encode(&picture), talk)?;
     }
     Ok(())
 }

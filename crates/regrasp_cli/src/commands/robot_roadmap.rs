@@ -66,24 +66,38 @@ fn save(roadmap: &RobotRoadmap, path: &Path, seconds: f64, talk: &Talk) -> Resul
     Ok(())
 }
 
-/// Saves the roadmap with what an answer has and it has not. Says so where there is nothing new, and writes nothing.
-pub fn grow(
-    (path, roadmap): &(PathBuf, RobotRoadmap),
-    (asked, settings): (&Asked, &PlannerSettings),
-    answer: &RobotAnswer,
-    talk: &Talk,
-) -> Result<(), Stop> {
-    let started = Instant::now();
-    let grown = roadmap.grown_by(asked, settings, answer).map_err(|failure| Stop::NoPlan(Box::new(failure)))?;
-    let seconds = started.elapsed().as_secs_f64();
-    let Some(grown) = grown else {
-        talk.say("grown  by nothing: the plan has no way and no exchange that is new to the roadmap");
-        talk.event("grown", json!({ "path": path, "is_new": false }));
-        return Ok(());
-    };
-    talk.say(format!("grown  {}, before {}   {}", grown.in_words(), roadmap.in_words(), duration(seconds)));
-    talk.event("grown", json!({ "path": path, "is_new": true }));
-    save(&grown, path, seconds, talk)
+/// A roadmap, and what it becomes by an answer.
+pub struct Grown {
+    path: PathBuf,
+    before: String,
+    /// None where the answer has nothing new.
+    now: Option<RobotRoadmap>,
+    seconds: f64,
+}
+
+impl Grown {
+    /// The roadmap with what an answer has and it has not.
+    pub fn by(
+        (path, roadmap): (PathBuf, RobotRoadmap),
+        (asked, settings): (&Asked, &PlannerSettings),
+        answer: &RobotAnswer,
+    ) -> Result<Self, Stop> {
+        let started = Instant::now();
+        let now = roadmap.grown_by(asked, settings, answer).map_err(|failure| Stop::NoPlan(Box::new(failure)))?;
+        Ok(Grown { path, before: roadmap.in_words(), now, seconds: started.elapsed().as_secs_f64() })
+    }
+
+    /// Saves it. Says so where there is nothing new, and writes nothing.
+    pub fn save(self, talk: &Talk) -> Result<(), Stop> {
+        let Grown { path, before, now, seconds } = self;
+        talk.event("grown", json!({ "path": path, "is_new": now.is_some() }));
+        let Some(now) = now else {
+            talk.say("grown  by nothing: the plan has no way and no exchange that is new to the roadmap");
+            return Ok(());
+        };
+        talk.say(format!("grown  {}, before {before}   {}", now.in_words(), duration(seconds)));
+        save(&now, &path, seconds, talk)
+    }
 }
 
 /// True where a file holds the roadmap of a robot: those of hands are binary.

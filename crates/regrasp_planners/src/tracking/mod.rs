@@ -180,6 +180,7 @@ fn failure(ended: &Ended, counts: &Counts, nearest: Option<(f64, TrackingGrasp)>
                 joints: grasp.joints.iter().flatten().copied().collect(),
             })
         }),
+        robot_miss: None,
         reached: None,
         statistics: statistics(counts),
     }

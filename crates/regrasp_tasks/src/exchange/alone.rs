@@ -3,10 +3,11 @@
 use super::POSTURES;
 use crate::clear::{HandLinks, is_hand_clear, links_of};
 use crate::context::Context;
-use crate::failing::{Stage, Tally};
+use crate::failing::{Stage, Tally, Try};
 use crate::forces;
 use crate::line::{collider, count};
 use crate::station::{arm_postures, with_fingers};
+use regrasp_arms::Collider;
 use regrasp_arms::model::ArmModel;
 use regrasp_geometry::Pose;
 use regrasp_robot::manipulator::layout::Part;
@@ -65,11 +66,20 @@ impl Alone {
         tally: &mut Tally,
     ) -> Result<Vec<Vec<f64>>, usize> {
         let grasp = &context.hands[hand].grasps[index];
+        let failed = |tally: &mut Tally, so_far: usize, reason: &str, state: Option<&Vec<f64>>| {
+            tally.keep(Stage::Exchange, so_far, || Try {
+                reason: reason.into(),
+                world_from_object: Some(*world_from_object),
+                grasps: vec![[hand, index]],
+                state: state.cloned(),
+            });
+        };
         let closed = with_fingers(context, common, hand, &grasp.closed);
         let pose = world_from_object * grasp.object_from_hand;
         tally.work(1);
         let postures = arm_postures(context, hand, &closed, &pose, POSTURES).map_err(|(by, words)| {
             tally.miss(Stage::Exchange, by, || words);
+            failed(tally, 1, super::REASONS[0], None);
             0usize
         })?;
         if !forces::holds(context, hand, grasp, world_from_object) {
@@ -80,26 +90,35 @@ impl Alone {
             Rc::new(Held { model: context.model(&closed, &context.arms_and_torso, None), links })
         });
         if !is_hand_clear(context, &held.links, &pose) {
+            failed(tally, 2, super::REASONS[1], postures.first());
             return Err(1);
         }
         let model = &held.model;
-        let own = &context.hands[hand];
-        // What this arm moves, against what rests and against the robot without other arms.
-        let arm: Vec<usize> =
-            (0..model.dimension()).filter(|&k| own.arm_joints.contains(&model.coordinates[k].index)).collect();
-        let moves = |body: usize| model.is_moved_by(body, &arm);
-        let is_other = |body: usize| match context.robot.part_of(model.bodies[body].link) {
-            Part::Arm(other) => other != own.arm,
-            Part::Hand(other) => other != own.mounted,
-            _ => false,
-        };
-        let mut collider = collider(context, model, &context.fixed);
-        collider.only(moves, |[a, b]| (moves(a) || moves(b)) && !is_other(a) && !is_other(b));
+        let mut collider = own_collider(context, (model, hand));
         let all: Vec<Vec<f64>> = postures.iter().map(|state| model.configuration_of(state)).collect();
         let free = collider.are_free(&all);
         count(&collider, tally);
-        let free: Vec<Vec<f64>> =
-            postures.into_iter().zip(free).filter_map(|(state, is_free)| is_free.then_some(state)).collect();
-        if free.is_empty() { Err(1) } else { Ok(free) }
+        let (free, others): (Vec<_>, Vec<_>) = postures.into_iter().zip(free).partition(|(_, is_free)| *is_free);
+        if free.is_empty() {
+            others.iter().for_each(|(state, _)| failed(tally, 2, super::REASONS[1], Some(state)));
+            return Err(1);
+        }
+        Ok(free.into_iter().map(|(state, _)| state).collect())
     }
+}
+
+/// The test of a hand by itself: what its arm moves, against what rests and against the robot without other arms.
+pub fn own_collider<'c>(context: &'c Context, (model, hand): (&'c ArmModel, usize)) -> Collider<'c> {
+    let own = &context.hands[hand];
+    let arm: Vec<usize> =
+        (0..model.dimension()).filter(|&k| own.arm_joints.contains(&model.coordinates[k].index)).collect();
+    let moves = |body: usize| model.is_moved_by(body, &arm);
+    let is_other = |body: usize| match context.robot.part_of(model.bodies[body].link) {
+        Part::Arm(other) => other != own.arm,
+        Part::Hand(other) => other != own.mounted,
+        _ => false,
+    };
+    let mut collider = collider(context, model, &context.fixed);
+    collider.only(moves, |[a, b]| (moves(a) || moves(b)) && !is_other(a) && !is_other(b));
+    collider
 }

@@ -2,6 +2,8 @@
 
 /// Tasks that have no plan.
 mod failures;
+/// Where failed tasks came nearest.
+mod misses;
 /// Tasks with plans.
 mod plans;
 /// Roadmaps that are made before.

@@ -36,51 +36,69 @@ impl Default for RobotStoryboard {
 }
 
 /// Height of a frame over its width.
-const ASPECT: f64 = 0.82;
+pub(super) const ASPECT: f64 = 0.82;
 /// From where frames are seen: from the right, in front and above.
-const TOWARD: [f64; 3] = [-0.75, 0.5, -0.42];
+pub(super) const TOWARD: [f64; 3] = [-0.75, 0.5, -0.42];
 /// Focal length over the picture's width.
-const FOCAL: f64 = 2.2;
+pub(super) const FOCAL: f64 = 2.2;
 /// Points of the path of a wrist.
 const PATH_POINTS: usize = 60;
-const LINK: &str = "#9aa3ad";
-const HAND: &str = "#6b7683";
-const OBJECT: &str = "#e69f00";
-const RESTING: &str = "#d8c48a";
-const OBSTACLE: &str = "#b5a492";
+pub(super) const LINK: &str = "#9aa3ad";
+pub(super) const HAND: &str = "#6b7683";
+pub(super) const OBJECT: &str = "#e69f00";
+pub(super) const RESTING: &str = "#d8c48a";
+pub(super) const OBSTACLE: &str = "#b5a492";
 
 /// A shape with its colour, on a link of the robot or in the world.
-struct Part {
-    link: Option<usize>,
-    frame: Pose,
-    surface: Arc<Surface>,
-    color: [f64; 3],
+pub(super) struct Part {
+    pub link: Option<usize>,
+    pub frame: Pose,
+    pub surface: Arc<Surface>,
+    pub color: [f64; 3],
+    /// Name of the link, or of the body that rests.
+    pub name: String,
 }
 
-fn part(link: Option<usize>, frame: Pose, shape: &Shape, color: &str) -> Part {
-    Part { link, frame, surface: Arc::new(Surface::of(&tessellate(shape))), color: linear(color) }
+impl Part {
+    /// At its place, where the links are at `poses`. Parts of one link have the same number; of bodies that rest none have.
+    pub fn placed(&self, number: usize, poses: &[Pose]) -> PlacedSurface {
+        PlacedSurface {
+            world_from_surface: self.link.map_or(self.frame, |link| poses[link] * self.frame),
+            surface: self.surface.clone(),
+            paint: Paint::Plain(self.color),
+            body: self.link.unwrap_or(1000 + number) as u32,
+        }
+    }
 }
 
-/// Everything that is drawn, while the robot is at the plan's first waypoint.
-fn parts(scene: &Scene, state: &State, robot: &Manipulator, plan: &RobotPlan) -> Vec<Part> {
+fn part(name: &str, link: Option<usize>, frame: Pose, shape: &Shape, color: &str) -> Part {
+    let surface = Arc::new(Surface::of(&tessellate(shape)));
+    Part { link, frame, surface, color: linear(color), name: name.to_owned() }
+}
+
+/// Everything that is drawn but the objects that are moved.
+pub(super) fn parts(scene: &Scene, state: &State, robot: &Manipulator, is_moved: impl Fn(&str) -> bool) -> Vec<Part> {
     let mut parts = Vec::new();
     for (l, link) in robot.robot.links.iter().enumerate() {
         let is_hand = matches!(robot.part_of(LinkId(l)), regrasp_robot::Part::Hand(_));
         let color = if is_hand { HAND } else { LINK };
-        let own = |placed: &PlacedShape| part(Some(l), placed.parent_from_shape, &placed.shape, color);
+        let own = |placed: &PlacedShape| part(&link.name, Some(l), placed.parent_from_shape, &placed.shape, color);
         parts.extend(link.collision.iter().map(own));
     }
     for finger in robot.hands.iter().flat_map(|hand| &hand.hand.fingers) {
         if let Some(own) = finger.tip.own_shape() {
             let link_from_body = robot.robot.fixed_pose_in_body(finger.tip.link).inverse();
-            parts.push(part(Some(finger.tip.link.0), link_from_body * own.parent_from_shape, &own.shape, HAND));
+            let link = finger.tip.link.0;
+            let name = &robot.robot.links[link].name;
+            parts.push(part(name, Some(link), link_from_body * own.parent_from_shape, &own.shape, HAND));
         }
     }
     let fixed = scene.obstacles.iter().chain(scene.supports.iter().map(|support| &support.body));
-    parts.extend(fixed.map(|body| part(None, body.placed.parent_from_shape, &body.placed.shape, OBSTACLE)));
+    let still = |placed: &PlacedShape, name: &str| part(name, None, placed.parent_from_shape, &placed.shape, OBSTACLE);
+    parts.extend(fixed.map(|body| still(&body.placed, &body.name)));
     for (object, pose) in scene.objects.iter().zip(&state.world_from_objects) {
-        if !plan.objects.contains(&object.name) {
-            parts.push(part(None, *pose, &object.shape, RESTING));
+        if !is_moved(&object.name) {
+            parts.push(part(&object.name, None, *pose, &object.shape, RESTING));
         }
     }
     parts
@@ -182,17 +200,10 @@ pub fn robot_storyboard(
         .filter_map(|name| scene.object_named(name))
         .map(|object| Arc::new(Surface::of(&tessellate(&scene.objects[object].shape))))
         .collect();
-    let parts = parts(scene, state, robot, plan);
+    let parts = parts(scene, state, robot, |name| plan.objects.iter().any(|object| object == name));
     let mut poses = Vec::new();
     let mut solid = |frame: &Frame| -> Vec<PlacedSurface> {
         robot.link_poses(&frame.joints, &mut poses);
-        let place = |part: &Part| part.link.map_or(part.frame, |link| poses[link] * part.frame);
-        let model = |(body, part): (usize, &Part)| PlacedSurface {
-            world_from_surface: place(part),
-            surface: part.surface.clone(),
-            paint: Paint::Plain(part.color),
-            body: part.link.unwrap_or(1000 + body) as u32,
-        };
         let objects = carried.iter().zip(&frame.world_from_objects).enumerate();
         let objects = objects.map(|(k, (surface, pose))| PlacedSurface {
             world_from_surface: *pose,
@@ -200,7 +211,7 @@ pub fn robot_storyboard(
             paint: Paint::Plain(linear(OBJECT)),
             body: 100_000 + k as u32,
         });
-        parts.iter().enumerate().map(model).chain(objects).collect()
+        parts.iter().enumerate().map(|(k, part)| part.placed(k, &poses)).chain(objects).collect()
     };
     let steps = captions(plan, settings.frames);
     let n_frames = steps.len();
@@ -260,6 +271,11 @@ fn robot_ball(
     };
     let mut points: Vec<Point> = postures.iter().flat_map(of_robot).collect();
     points.extend(moments.iter().flat_map(|frame| wrists(robot, &frame.joints)));
+    ball_about(&points)
+}
+
+/// A ball that holds points.
+pub(super) fn ball_about(points: &[Point]) -> (Point, f64) {
     let first = points.first().copied().unwrap_or_else(Point::origin);
     let (low, high) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
     let center = nalgebra::center(&low, &high);

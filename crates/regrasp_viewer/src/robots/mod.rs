@@ -2,6 +2,8 @@
 
 /// Charts over time.
 mod charts;
+/// What failed, in the scene.
+mod failure;
 /// Key frames in one picture.
 mod frames;
 /// Super graphs.
@@ -13,6 +15,7 @@ mod replay;
 /// The task chart.
 mod task_chart;
 
+pub use failure::{ExchangePlaces, Met, MissingHand, RobotFailure, robot_failure_page, robot_failure_picture};
 pub use frames::{RobotStoryboard, robot_storyboard};
 pub use graph::{WristGraph, corners, wrist_graph};
 pub use replay::{ReplayAxis, ReplayBody, ReplayHolder, ReplayKind, ReplayPiece, ReplaySegment, RobotReplay};

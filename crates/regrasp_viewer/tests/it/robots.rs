@@ -94,3 +94,78 @@ fn wrist_graphs_show_what_they_hold() {
     }
     assert!(!wrist_graph(&WristGraph::default(), "empty").contains("NaN"));
 }
+
+/// The two that meet are painted in their colours, what is missing is drawn, and words stand below.
+#[test]
+fn failures_are_drawn_in_their_scene() {
+    use regrasp_geometry::{Point, Pose};
+    use regrasp_viewer::robots::{
+        ExchangePlaces, Met, MissingHand, RobotFailure, robot_failure_page, robot_failure_picture,
+    };
+    use regrasp_viewer::story::{CauseStory, FailureStory};
+
+    let (loaded, plan) = pick_and_place();
+    let first = plan.waypoints().next().unwrap();
+    let at = |k: usize| Pose::from(&plan.waypoints().nth(k).unwrap().world_from_objects[0]);
+    let n = plan.waypoints().count();
+    let story = FailureStory {
+        kind: "impossible".into(),
+        message: "place: 3 tried, 3 in collision <&>".into(),
+        advice: "move it".into(),
+        causes: vec![CauseStory { reason: "place: in collision".into(), count: 3, share: 1.0 }],
+        nearest_miss: None,
+    };
+    let object = loaded.scene.object_named(&plan.objects[0]).unwrap();
+    let bare = RobotFailure {
+        scene: &loaded.scene,
+        state: &loaded.state,
+        robot: 0,
+        joints: &first.joints,
+        what: "place: in collision".into(),
+        object: Some((object, [at(0), at(0), at(n - 1)])),
+        meeting: None,
+        missing: Vec::new(),
+        exchanges: Vec::new(),
+        failure: &story,
+    };
+    // Pixels near a colour: red well above green and blue, or blue above both.
+    let reddish = |rgb: &[u8]| rgb[0] > 110 && i32::from(rgb[0]) > 3 * i32::from(rgb[1].max(rgb[2]));
+    let count = |of: &RobotFailure| {
+        let picture = robot_failure_picture(of).unwrap();
+        picture.rgb.chunks_exact(3).filter(|rgb| reddish(rgb)).count()
+    };
+    let robot = &loaded.scene.robots[0];
+    let link = robot.robot.links[robot.arms[0].mount.0].name.clone();
+    let shown =
+        robot.robot.links.iter().find(|link| !link.collision.is_empty() && link.name.contains("right")).unwrap();
+    let table = loaded.scene.supports[0].body.name.clone();
+    let meeting = RobotFailure { meeting: Some([Met::Link(shown.name.clone()), Met::Resting(table)]), ..bare.clone() };
+    let (none, some) = (count(&bare), count(&meeting));
+    assert!(none < 50 && some > 300, "{none} and {some} pixels of the first body's colour, mount link {link}");
+    assert_eq!(robot_failure_picture(&meeting).unwrap(), robot_failure_picture(&meeting).unwrap());
+
+    let mut poses = Vec::new();
+    robot.link_poses(&first.joints, &mut poses);
+    let wrist = Point::from(poses[robot.arms[0].mount.0].translation.vector);
+    let away = regrasp_geometry::Vector::new(0.2, 0.0, 0.2);
+    let base = poses[robot.hands[0].hand.base.0];
+    let missing = MissingHand {
+        hand: 0,
+        world_from_hand: Pose::translation(away.x, away.y, away.z) * base,
+        wrist: [wrist, wrist + away],
+    };
+    let places = ExchangePlaces { outcome: "out of reach".into(), places: vec![wrist + away * 2.0] };
+    let reach = RobotFailure { missing: vec![missing], exchanges: vec![places], ..bare.clone() };
+    assert!(count(&reach) > 300, "an arrow to where the wrist should be");
+    // A third view is there where exchanges are.
+    assert!(robot_failure_picture(&reach).unwrap() != robot_failure_picture(&bare).unwrap());
+
+    let facts = vec![("Result".to_owned(), "NO PLAN: <impossible>".to_owned())];
+    let page = robot_failure_page(&meeting, &facts, "<two>").unwrap();
+    assert_eq!(page, robot_failure_page(&meeting, &facts, "<two>").unwrap());
+    assert!(page.contains("&lt;two&gt;") && page.contains("NO PLAN") && page.contains("data:image/png;base64,"));
+    assert!(page.contains("&lt;impossible&gt;") && !page.contains("<impossible>") && !page.contains("<script"));
+    let short = RobotFailure { joints: &first.joints[1..], ..bare.clone() };
+    assert!(robot_failure_picture(&short).is_err());
+    assert!(robot_failure_picture(&RobotFailure { robot: 7, ..bare }).is_err());
+}

@@ -415,6 +415,7 @@ impl<'a> RoadmapPlanner<'a> {
             causes: search.whole_tally().causes(&self.model),
             leg: None,
             nearest_miss: None,
+            robot_miss: None,
             reached: None,
             statistics: Statistics { work: search.workspace.work, ..Statistics::default() },
         }

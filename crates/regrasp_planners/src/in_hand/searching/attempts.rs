@@ -116,6 +116,7 @@ impl Left {
             causes,
             leg,
             nearest_miss,
+            robot_miss: None,
             reached: self.reached.clone(),
             statistics: Statistics {
                 cut_by_time: interrupt != Interrupt::WorkSpent,
