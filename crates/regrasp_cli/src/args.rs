@@ -10,7 +10,7 @@ pub use grasps::Grasps;
 pub use judging::{Judging, JudgingLimits};
 pub use place::Place;
 pub use roadmap::{Roadmap, RoadmapAction, RoadmapBench, RoadmapBuild, RoadmapPicture, RoadmapQuery};
-use values::{count, degrees, margin, metres, package, seconds, threads, trials, whole_number};
+use values::{count, margin, package, seconds, threads, trials, whole_number};
 
 use clap::builder::PossibleValuesParser;
 use clap::{ArgGroup, Args, Parser, Subcommand};

@@ -1,10 +1,9 @@
 //! Arguments of `regrasp roadmap`.
 
 use super::Judging;
-use super::values::{count, margin, seconds, whole_number};
+use super::values::{count, degrees, margin, metres, threads, whole_number};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// `regrasp roadmap`
 #[derive(Debug, Args)]
