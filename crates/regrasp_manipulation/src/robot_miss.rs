@@ -74,7 +74,8 @@ pub struct TriedExchange {
 pub struct RobotMiss {
     /// What failed there: `place: hands in collision`.
     pub reason: String,
-    /// The robot's joints, in the order of its joint vector. Where a hand is wanted, the arm is stretched towards it, whatever is in its way.
+    /// The robot's joints, in the order of its joint vector. Where a hand is wanted, the arm is stretched towards it as far as
+    /// nothing meets, by a local search.
     pub joints: Vec<f64>,
     /// The object's pose there; none for motions without an object.
     pub world_from_object: Option<PoseData>,

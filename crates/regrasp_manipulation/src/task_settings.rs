@@ -15,6 +15,32 @@ pub enum TaskCost {
     Changes,
 }
 
+/// What is natural in a posture, and how much it counts against the rest (Saut 2010, sec. V-C). Of several postures of an arm for one pose of
+/// its hand, that with the least weighted sum is tried first. Zeros leave the order of inverse kinematics: the smallest change of a joint
+/// first.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PostureWeights {
+    /// For each radian of the Euclidean distance between the arm's joints and its home posture; the same for common joints.
+    pub joints: f64,
+    /// For each metre that the elbow is higher or lower than in the home posture.
+    pub height: f64,
+    /// For each metre between the wrist and the plane of torso and shoulders. It tells postures of the common joints apart.
+    pub plane: f64,
+}
+
+impl PostureWeights {
+    /// Nothing counts.
+    pub const NONE: PostureWeights = PostureWeights { joints: 0.0, height: 0.0, plane: 0.0 };
+}
+
+impl Default for PostureWeights {
+    /// By measurement (`docs/benchmarks/tasks.md`): no weight makes plans of all scenes shorter, or planning faster.
+    fn default() -> Self {
+        PostureWeights::NONE
+    }
+}
+
 /// Settings of tasks of pick and place. Lengths in metres, times in seconds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -45,6 +71,8 @@ pub struct TaskSettings {
     pub rest: f64,
     /// Postures of the common joints that are drawn for one grasp, besides that of the start.
     pub common_draws: usize,
+    /// Which postures of an arm are tried first.
+    pub posture: PostureWeights,
     /// Places of the exchange that are tried for one pair of grasps, the best of the grid first.
     pub exchange_places: usize,
     /// Orientations of the object that are tried at one place.
@@ -93,6 +121,7 @@ impl Default for TaskSettings {
             carried_inertia: 0.25,
             rest: 0.2,
             common_draws: 24,
+            posture: PostureWeights::default(),
             exchange_places: 40,
             exchange_turns: 4,
             exchange_draws: 100,
@@ -128,6 +157,9 @@ impl TaskSettings {
         between("lift", self.lift, 1e-3, 1.0)?;
         between("carried_inertia", self.carried_inertia, 0.01, 100.0)?;
         between("rest", self.rest, 1e-3, 100.0)?;
+        between("posture.joints", self.posture.joints, 0.0, 1e3)?;
+        between("posture.height", self.posture.height, 0.0, 1e3)?;
+        between("posture.plane", self.posture.plane, 0.0, 1e3)?;
         between("exchange_spread", self.exchange_spread, 0.0, 10.0)?;
         between("exchange_grid", self.exchange_grid, 0.01, 10.0)?;
         let at_most = |name: &str, value: usize, most: usize| match value <= most {

@@ -1,6 +1,7 @@
 //! Scene, robot and grasps, prepared once.
 
 use crate::failing::refused;
+use crate::posture::Rest;
 use nalgebra::{Matrix3, Translation3};
 use regrasp_arms::model::cover::{LinkCover, cover, covers};
 use regrasp_arms::model::{ArmModel, Attached};
@@ -109,6 +110,8 @@ pub struct Context<'a> {
     pub alone: World,
     /// Hands that can take the object.
     pub hands: Vec<TaskHand<'a>>,
+    /// The rest posture, and what others cost against it.
+    pub natural: Rest,
     /// Limits of all coordinates.
     pub limits: Limits,
     /// Acceleration of gravity in the world.
@@ -265,6 +268,8 @@ impl<'a> Context<'a> {
             |_| Matrix3::from_diagonal_element(0.4 * object.mass * object.radius * object.radius),
             |solid| solid.inertia_per_density * (object.mass / solid.volume),
         );
+        let gravity = scene.gravity().in_world().unwrap_or_else(Vector::zeros);
+        let up = (-gravity).try_normalize(1e-9).unwrap_or_else(Vector::zeros);
         Ok(Context {
             scene,
             query,
@@ -288,8 +293,9 @@ impl<'a> Context<'a> {
             fixed,
             alone: World::new(vec![Obstacle { name: object.name.clone(), placed: own }]),
             hands,
+            natural: Rest::new(robot, &up, settings.posture),
             limits: regrasp_arms::plan::limits(scene, robot, &all),
-            gravity: scene.gravity().in_world().unwrap_or_else(Vector::zeros),
+            gravity,
             inertia,
             arms_and_torso: all.iter().copied().filter(|&k| !is_finger(k)).collect(),
             rest: state.clone(),

@@ -6,7 +6,7 @@ mod alone;
 use crate::context::{Context, Grasp};
 use crate::failing::{Stage, Tally, Try};
 use crate::line::{LINE_STEPS, are_states_free, is_state_free, is_way_free, straight};
-use crate::station::{Effort, WAY_SHARES, can_close, common_postures, with_fingers};
+use crate::station::{Effort, WAY_SHARES, can_close, common_postures, natural_first, with_fingers};
 use crate::timing::Smooth;
 pub use alone::own_collider;
 use alone::{Alone, At};
@@ -180,7 +180,8 @@ impl Places {
                 })
                 .max_by(|a, b| a.0.total_cmp(&b.0));
             let Some((_, turn)) = best else { continue };
-            let commons = common_postures(context, &hands, &context.query.start, COMMON_DRAWS, &mut rng);
+            let mut commons = common_postures(context, &hands, &context.query.start, COMMON_DRAWS, &mut rng);
+            natural_first(context, &mut commons, &[at, at]);
             for common in &commons {
                 if let Some(give) = attempt.at((&pose_at(context, &at, &turn), None), common, tally) {
                     return Ok(give);

@@ -28,6 +28,8 @@ mod miss;
 mod motions;
 /// Where the object may lie.
 mod placements;
+/// How natural postures are.
+mod posture;
 /// Segments and waypoints.
 mod record;
 /// What is made before any query.
@@ -38,7 +40,7 @@ mod station;
 mod timing;
 
 pub use regrasp_manipulation::failure::{Cause, Failure, FailureKind};
-pub use regrasp_manipulation::task_settings::{TaskCost, TaskSettings};
+pub use regrasp_manipulation::task_settings::{PostureWeights, TaskCost, TaskSettings};
 
 pub use roadmap::{RoadmapBuildSettings, TaskAnswer, TaskRoadmap, build_roadmap};
 

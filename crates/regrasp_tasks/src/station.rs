@@ -7,15 +7,18 @@ use crate::failing::{Stage, Tally, Try};
 use crate::forces;
 use crate::line::{LINE_STEPS, are_states_free, is_lift_free, is_motion_free, is_state_free, is_way_free, straight};
 use crate::placements::{Place, stable_pose};
+use crate::posture::least_first;
 use crate::timing::Smooth;
 use regrasp_base::Rng;
-use regrasp_geometry::Pose;
-use regrasp_robot::kinematics::arm_ik::{IkBudget, Unreachable};
+use regrasp_geometry::{Point, Pose};
+use regrasp_robot::kinematics::arm_ik::{ArmPosture, IkBudget, Unreachable};
 use std::cell::OnceCell;
 
 /// Postures of an arm that are looked at for one posture of the common joints: at first, and where nothing else is left.
 const POSTURES: usize = 4;
 const MORE_POSTURES: usize = 24;
+/// So many times as many postures are compared for how natural they are.
+const POOL: usize = 3;
 /// So many times as many postures of the common joints are drawn where nothing else is left.
 const MORE_DRAWS: usize = 8;
 /// Reasons for which no posture is looked at.
@@ -93,7 +96,17 @@ pub fn common_postures(
     found
 }
 
-/// Joints of the arm of `hand` that bring its base to a pose, the nearest to those of `state` first. Errors: how far it is out of reach.
+/// Puts drawn postures of the common joints, all but the first, in the order of how natural they are with wrists at points.
+pub fn natural_first(context: &Context, commons: &mut [Vec<f64>], wrists: &[Point]) {
+    if let Some((_, drawn)) = commons.split_first_mut()
+        && !context.natural.is_silent()
+    {
+        least_first(drawn, |state| context.natural.of_common(context.robot, state, wrists));
+    }
+}
+
+/// Joints of the arm of `hand` that bring its base to a pose, the most natural first, of those nearest to the joints of `state`. Errors: how
+/// far it is out of reach.
 pub fn arm_postures(
     context: &Context,
     hand: usize,
@@ -105,16 +118,23 @@ pub fn arm_postures(
     let arm = &context.robot.arms[own.arm];
     let base = context.robot.world_from_root() * root_from(context, arm.base, state);
     let base_from_mount = base.inverse() * world_from_hand * own.hand_from_mount;
-    let budget = IkBudget { postures: n_postures, starts: 30, free_angles: 24, seed: context.seed };
+    // More come for nothing only where all are known in closed form.
+    let weighs = n_postures > 1 && context.natural.weighs_arms();
+    let n_found = if weighs && own.ik.has_closed_form() { n_postures * POOL } else { n_postures };
+    let budget = IkBudget { postures: n_found, starts: 30, free_angles: 24, seed: context.seed };
     match own.ik.solve(&base_from_mount, &state[own.arm_joints.clone()], &budget) {
-        Ok(postures) => Ok(postures
-            .into_iter()
-            .map(|posture| {
+        Ok(mut postures) => {
+            if weighs {
+                let natural = &context.natural;
+                least_first(&mut postures, |found| natural.of_arm(context.robot, own.arm, &base, &found.joints));
+            }
+            let state_of = |posture: ArmPosture| {
                 let mut state = state.to_vec();
                 state[own.arm_joints.clone()].copy_from_slice(&posture.joints);
                 state
-            })
-            .collect()),
+            };
+            Ok(postures.into_iter().take(n_postures).map(state_of).collect())
+        }
         Err(unreachable) => {
             let by = match &unreachable {
                 Unreachable::TooFar { by } | Unreachable::TooNear { by } | Unreachable::Limits { by, .. } => *by,
@@ -163,7 +183,9 @@ pub fn station(
     // Made when they are needed.
     let model = |k: usize| models[k].get_or_init(|| context.model(states[k].0, free, states[k].1));
     let mut rng = Rng::keyed(context.seed, "common", 0);
-    let commons = common_postures(context, &[hand], &closed, n_draws, &mut rng);
+    let mut commons = common_postures(context, &[hand], &closed, n_draws, &mut rng);
+    let wrist = (world_from_hand * context.hands[hand].hand_from_mount).translation.vector;
+    natural_first(context, &mut commons, &[wrist.into()]);
     for common in &commons {
         tally.work(1);
         let postures = match arm_postures(context, hand, common, &world_from_hand, n_postures) {

@@ -20,6 +20,7 @@ use regrasp_arms::roadmap::{Roads, fingerprint_of_robot, fingerprint_of_world};
 use regrasp_base::Budget;
 use regrasp_base::files::sha256;
 use regrasp_grasp::list::GraspList;
+use regrasp_manipulation::task_settings::PostureWeights;
 use regrasp_plan::RobotPlan;
 use regrasp_scene::{PickAndPlaceQuery, Scene, State};
 use std::fmt::Write as _;
@@ -175,10 +176,14 @@ pub(crate) fn origin(context: &Context, model: &ArmModel) -> Origin {
         let _ = writeln!(grasps, "{} {} {kept:?}", context.scene.hands[hand.index].name, sha256(listed.as_bytes()));
     }
     let of = context.settings;
-    let settings = format!(
+    let mut settings = format!(
         "{:?} {:?} {:?} {:?} {:?} {:?}",
         of.clearance, of.line_step, of.exchange_turns, of.exchange_draws, of.exchange_spread, of.forces
     );
+    // Roadmaps of before these weights keep their fingerprint.
+    if of.posture != PostureWeights::NONE {
+        let _ = write!(settings, " {:?}", of.posture);
+    }
     Origin {
         robot: fingerprint_of_robot(model),
         world: fingerprint_of_world(&context.fixed),

@@ -8,7 +8,7 @@ use regrasp_plan::check::{CheckSettings, ViolationKind, check_any};
 use regrasp_plan::robot_plan::RobotSegmentKind;
 use regrasp_robot::manipulator::layout::Part;
 use regrasp_scene::Query;
-use regrasp_tasks::TaskSettings;
+use regrasp_tasks::{PostureWeights, TaskSettings};
 
 #[test]
 fn one_arm_does_it_where_that_suffices() {
@@ -166,4 +166,31 @@ fn a_robot_with_grippers_moves_without_parting_their_jaws() {
         .expect("a plan");
     let report = regrasp_plan::check::check_robot(world, Some(&query), &plan, &CheckSettings::default());
     assert!(report.accepted(), "{:?}", report.violations.first());
+}
+
+/// Weights choose among postures of the arm: where only the height of the elbow counts, it is at the grasp no farther from that of the home
+/// posture than where nothing counts. Plans are accepted whatever the weights are.
+#[test]
+fn weights_of_postures_choose_among_them() {
+    let case = Case::new("justin_horse.toml");
+    let robot = &case.loaded.scene.robots[0];
+    let elbow = |state: &[f64]| {
+        let mut poses = Vec::new();
+        robot.link_poses(state, &mut poses);
+        let names = &robot.arms[0].chain.names;
+        let joint = robot.robot.joint_named(&names[names.len() / 2]).unwrap();
+        poses[robot.robot.joints[joint.0].child.0].translation.vector.z
+    };
+    let home = elbow(&robot.layout.rest());
+    let off = |posture: PostureWeights| {
+        let plan = case.accepted(&TaskSettings { posture, ..TaskSettings::default() }, 3);
+        let grasp = plan.segments.iter().find(|segment| segment.kind == RobotSegmentKind::Grasp).expect("a grasp");
+        (elbow(&grasp.waypoints[0].joints) - home).abs()
+    };
+    let [plain, weighed] = [PostureWeights::NONE, PostureWeights { height: 10.0, ..PostureWeights::NONE }].map(off);
+    assert!(weighed <= plain + 1e-9, "{weighed} against {plain}");
+    off(PostureWeights { joints: 1.0, height: 3.0, plane: 3.0 });
+    let wrong =
+        TaskSettings { posture: PostureWeights { joints: -1.0, ..PostureWeights::NONE }, ..TaskSettings::default() };
+    assert!(wrong.validate().unwrap_err().contains("posture.joints"));
 }
