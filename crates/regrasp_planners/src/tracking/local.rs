@@ -96,6 +96,13 @@ struct Tried {
     covering: Option<Vec<Fingers>>,
 }
 
+impl Tried {
+    /// True where ranges were asked for and none has the sub-goal.
+    fn has_no_range(&self) -> bool {
+        self.covering.as_ref().is_some_and(Vec::is_empty)
+    }
+}
+
 /// How often steps failed, by Cherif 1999's numbers; 0 and [`OUTSIDE_RANGES`] for what it does not list.
 pub type Failures = [u64; 9];
 /// Sub-goals that no range of orientations has.
@@ -146,15 +153,12 @@ impl Local<'_, '_, '_> {
         let mut steps: Vec<TrackingStep> = Vec::new();
         let mut here = start.clone();
         self.stepper.workspace.set(&here.world_from_object.to_pose(), &here.joints, &here.contacts());
-        if settings.range_coverage {
-            if !self.enter_range(&mut here, &mut steps, goal) {
-                self.failures[OUTSIDE_RANGES] += 1;
-                return LocalPlan { steps: Vec::new(), arrived: false };
-            }
-        } else {
-            self.restore(&mut here, &mut steps, FAR, NEAR);
+        self.restore(&mut here, &mut steps, FAR, NEAR);
+        if settings.range_coverage && !self.enter_range(&mut here, &mut steps, goal) {
+            self.failures[OUTSIDE_RANGES] += 1;
+            return LocalPlan { steps: Vec::new(), arrived: false };
         }
-        let n_restored = steps.len();
+        let mut n_restored = steps.len();
         let mut choice = before.map(|roles| {
             let way = |_| Some(Vector::zeros());
             Choice { roles, controls: self.controls_home(&here, roles.moving, way, settings.time_step), turn: None }
@@ -171,6 +175,9 @@ impl Local<'_, '_, '_> {
                 let next = kept.or_else(|| self.choose(&here, &left, &mut tried, choice));
                 tried.n += 1;
                 tried.guilty = 0;
+                if tried.has_no_range() {
+                    break;
+                }
                 let Some(next) = next else {
                     self.failures[NoStep::Degenerate.number()] += 1;
                     continue;
@@ -188,7 +195,15 @@ impl Local<'_, '_, '_> {
                     }
                 }
             }
-            let Some(step) = made else { break };
+            let Some(step) = made else {
+                // Where the range ends another one is begun.
+                let n_before = steps.len();
+                if tried.has_no_range() && self.enter_range(&mut here, &mut steps, goal) {
+                    n_restored += steps.len() - n_before;
+                    continue;
+                }
+                break;
+            };
             here = step.end.clone();
             steps.push(step);
         }
