@@ -2,6 +2,8 @@
 
 use crate::tracking::forces::Forces;
 use crate::tracking::grasp::TrackingGrasp;
+use crate::tracking::range::RESTING;
+use crate::tracking::settings::TrackingSettings;
 use crate::tracking::start_grasp::choose_start;
 use crate::tracking::step::Stepper;
 use regrasp_geometry::{Shape, TriangleMesh};
@@ -46,6 +48,16 @@ pub fn refuse(model: &Model, gravity: &Gravity) -> Result<(), Failure> {
         return Err(impossible(message, "give gravity a direction"));
     }
     Ok(())
+}
+
+/// Refuses ranges of orientations (Cherif 1999, sec. 4) with a hand of which two fingers rest: they leave the object's position open.
+pub fn refuse_ranges_of_few(model: &Model, settings: &TrackingSettings) -> Result<(), Failure> {
+    let n = model.n_fingers();
+    if !settings.range_coverage || n > RESTING {
+        return Ok(());
+    }
+    let message = format!("range_coverage is for three fingers that rest, and of the hand's {n} fingers two rest");
+    Err(impossible(message, "leave range_coverage out, or use a hand of four fingers or more"))
 }
 
 /// How far a vertex is in front of the plane of a triangle at most, where that is more than `allowed`.

@@ -2,6 +2,7 @@
 
 use crate::tracking::grasp::{PerFinger, TrackingGrasp, turn_to};
 use crate::tracking::object_motion::ObjectMotion;
+use crate::tracking::range::{RESTING, Range};
 use crate::tracking::settings::RoleChoice;
 use crate::tracking::step::{Asked, Controls, Fingers, NoStep, Roles, STEP_WORK, Stepper, TrackingStep, each};
 use arrayvec::ArrayVec;
@@ -37,6 +38,8 @@ const KEPT: f64 = 0.05;
 const FAR: f64 = 0.06;
 /// See [`FAR`].
 const NEAR: f64 = 0.04;
+/// Distance from home, in the same unit, at which a finger is back on its first contact, where ranges are asked for. By hand.
+const BACK: f64 = 0.01;
 /// What a step must bring a finger nearer home, to be followed by another, in the same unit. By hand.
 const LEAST_GAIN: f64 = 1e-4;
 /// What distance from home, in the same unit, counts against alignment. By hand.
@@ -70,10 +73,11 @@ pub enum Homes {
 
 impl Homes {
     /// Of a start grasp: on a polyhedron the fingertips belong to the faces that they are on if they `keep_faces`, else and elsewhere
-    /// to places in the world. There they roll from face to face as the object turns.
-    pub fn of(model: &Model, start: &TrackingGrasp, keep_faces: bool) -> Self {
+    /// to places in the world. There they roll from face to face as the object turns. With `ranges` they belong to their contacts on
+    /// smooth objects too (Cherif 1999, sec. 4.2).
+    pub fn of(model: &Model, start: &TrackingGrasp, keep_faces: bool, ranges: bool) -> Self {
         let surface = &model.view.object.surface;
-        match keep_faces && surface.crease_distance(&start.touches[0].foot).is_finite() {
+        match keep_faces && (ranges || surface.crease_distance(&start.touches[0].foot).is_finite()) {
             true => Homes::OnObject(start.touches.iter().map(|touch| touch.ball.center).collect()),
             false => Homes::InWorld(model.fingers.iter().map(|finger| finger.tip_at_rest).collect()),
         }
@@ -88,10 +92,21 @@ struct Tried {
     guilty: Fingers,
     /// Roles that fail whatever the moving fingers do.
     useless: Vec<Roles>,
+    /// Moving fingers beside which the range of those that rest has the sub-goal, once asked for.
+    covering: Option<Vec<Fingers>>,
 }
 
-/// How often steps failed, by Cherif 1999's numbers; 0 for what it does not list.
-pub type Failures = [u64; 8];
+impl Tried {
+    /// True where ranges were asked for and none has the sub-goal.
+    fn has_no_range(&self) -> bool {
+        self.covering.as_ref().is_some_and(Vec::is_empty)
+    }
+}
+
+/// How often steps failed, by Cherif 1999's numbers; 0 and [`OUTSIDE_RANGES`] for what it does not list.
+pub type Failures = [u64; 9];
+/// Sub-goals that no range of orientations has.
+const OUTSIDE_RANGES: usize = 8;
 
 /// Roles and the moving fingers' controls, kept from step to step while they do.
 #[derive(Debug, Clone, Copy)]
@@ -138,8 +153,12 @@ impl Local<'_, '_, '_> {
         let mut steps: Vec<TrackingStep> = Vec::new();
         let mut here = start.clone();
         self.stepper.workspace.set(&here.world_from_object.to_pose(), &here.joints, &here.contacts());
-        self.restore(&mut here, &mut steps);
-        let n_restored = steps.len();
+        self.restore(&mut here, &mut steps, FAR, NEAR);
+        if settings.range_coverage && !self.enter_range(&mut here, &mut steps, goal) {
+            self.failures[OUTSIDE_RANGES] += 1;
+            return LocalPlan { steps: Vec::new(), arrived: false };
+        }
+        let mut n_restored = steps.len();
         let mut choice = before.map(|roles| {
             let way = |_| Some(Vector::zeros());
             Choice { roles, controls: self.controls_home(&here, roles.moving, way, settings.time_step), turn: None }
@@ -153,9 +172,12 @@ impl Local<'_, '_, '_> {
             let mut made = None;
             while tried.n < settings.trials {
                 let kept = choice.filter(|_| tried.n == 0).and_then(|choice| self.keep(&here, &choice, &left));
-                let next = kept.or_else(|| self.choose(&here, &left, &tried, choice));
+                let next = kept.or_else(|| self.choose(&here, &left, &mut tried, choice));
                 tried.n += 1;
                 tried.guilty = 0;
+                if tried.has_no_range() {
+                    break;
+                }
                 let Some(next) = next else {
                     self.failures[NoStep::Degenerate.number()] += 1;
                     continue;
@@ -173,7 +195,15 @@ impl Local<'_, '_, '_> {
                     }
                 }
             }
-            let Some(step) = made else { break };
+            let Some(step) = made else {
+                // Where the range ends another one is begun.
+                let n_before = steps.len();
+                if tried.has_no_range() && self.enter_range(&mut here, &mut steps, goal) {
+                    n_restored += steps.len() - n_before;
+                    continue;
+                }
+                break;
+            };
             here = step.end.clone();
             steps.push(step);
         }
@@ -181,14 +211,46 @@ impl Local<'_, '_, '_> {
         LocalPlan { steps, arrived }
     }
 
-    /// While the object rests, rolls fingers back that are [`FAR`] from home until they are [`NEAR`] or come no nearer: the
+    /// True where some range has the turn to `goal`, if need be after the fingertips have gone back to their first contacts: the
+    /// scheme of Cherif 1999, sec. 4.1.2. `here` becomes the end of what is added to `steps`.
+    fn enter_range(
+        &mut self,
+        here: &mut TrackingGrasp,
+        steps: &mut Vec<TrackingStep>,
+        goal: &UnitQuaternion<f64>,
+    ) -> bool {
+        let left = turn_to(&here.orientation(), goal);
+        if !self.covering(here, &left).is_empty() {
+            return true;
+        }
+        self.restore(here, steps, BACK, BACK);
+        !steps.is_empty() && !self.covering(here, &left).is_empty()
+    }
+
+    /// Moving fingers, a set for each choice, beside which the range of those that rest has the turn `left`, in the world.
+    fn covering(&mut self, here: &TrackingGrasp, left: &Vector) -> Vec<Fingers> {
+        self.stepper.work += STEP_WORK;
+        let model = self.stepper.model;
+        let covers = |moving: &Fingers| {
+            let resting: PerFinger<usize> = each(model.all_fingers() & !moving).collect();
+            <[usize; RESTING]>::try_from(&resting[..]).is_ok_and(|resting| Range::of(model, here, resting).covers(left))
+        };
+        let mut moving: Vec<Fingers> =
+            Roles::all(model.n_fingers(), self.stepper.resting).map(|roles| roles.moving).collect();
+        moving.dedup();
+        moving.retain(covers);
+        moving
+    }
+
+    /// While the object rests, rolls fingers back that are `far` from home until they are `near` or come no nearer: the
     /// object at rest of Cherif 1999 (section 6.2.4, `w_O` of zero), with a purpose. `here` becomes the end of what is added to `steps`.
-    fn restore(&mut self, here: &mut TrackingGrasp, steps: &mut Vec<TrackingStep>) {
+    /// Both distances are in units of the object's size.
+    fn restore(&mut self, here: &mut TrackingGrasp, steps: &mut Vec<TrackingStep>, far: f64, near: f64) {
         let model = self.stepper.model;
         let size = model.frame.torque_scale;
         for moving in 0..model.n_fingers() {
             let mut before = self.lag(here, moving);
-            if before < FAR * size || !self.rolls_by_itself(moving) {
+            if before < far * size || !self.rolls_by_itself(moving) {
                 continue;
             }
             let rolling = self.rolling.filter(|once| *once != moving).unwrap_or((moving + 1) % model.n_fingers());
@@ -210,7 +272,7 @@ impl Local<'_, '_, '_> {
                 *here = step.end.clone();
                 steps.push(step);
                 let now = self.lag(here, moving);
-                if now < NEAR * size || now > before - LEAST_GAIN * size {
+                if now < near * size || now > before - LEAST_GAIN * size {
                     break;
                 }
                 before = now;
@@ -287,8 +349,17 @@ impl Local<'_, '_, '_> {
     }
 
     /// Other roles: those that lead best towards the goal and whose moving fingers have reach left, with some chance.
-    fn choose(&mut self, here: &TrackingGrasp, left: &Vector, tried: &Tried, before: Option<Choice>) -> Option<Choice> {
+    fn choose(
+        &mut self,
+        here: &TrackingGrasp,
+        left: &Vector,
+        tried: &mut Tried,
+        before: Option<Choice>,
+    ) -> Option<Choice> {
         self.stepper.work += STEP_WORK;
+        if self.stepper.settings.range_coverage && tried.covering.is_none() {
+            tried.covering = Some(self.covering(here, left));
+        }
         let model = self.stepper.model;
         let n = model.n_fingers();
         let has_failed = tried.n > 0;
@@ -300,6 +371,9 @@ impl Local<'_, '_, '_> {
             Roles::all(n, self.stepper.resting).filter(|roles| tried.guilty == 0 || roles.moving & tried.guilty != 0)
         {
             if self.rolling.is_some_and(|once| once != roles.rolling) || tried.useless.contains(&roles) {
+                continue;
+            }
+            if tried.covering.as_ref().is_some_and(|covering| !covering.contains(&roles.moving)) {
                 continue;
             }
             let noise = self.rng.uniform(0.0, chance);

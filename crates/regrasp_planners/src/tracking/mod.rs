@@ -18,6 +18,8 @@ mod grasp;
 mod local;
 /// How the object moves on fingertips that rest.
 mod object_motion;
+/// Ranges of orientations that three resting fingertips allow.
+mod range;
 /// The plan as it is written to a file.
 mod record;
 /// A* over orientations.
@@ -84,6 +86,7 @@ fn plan_in_hand_frame(
     let model = Model::new(view, &settings.in_hand.physics);
     refuse_fingers_that_cannot_follow(&model)?;
     endpoints::refuse(&model, &view.gravity)?;
+    endpoints::refuse_ranges_of_few(&model, settings)?;
     let forces = model.forces.as_ref().expect("settings without forces do not validate");
     let mut stepper = Stepper {
         model: &model,
@@ -137,8 +140,8 @@ fn statistics(counts: &Counts) -> Statistics {
     }
 }
 
-/// Failures 1 to 7 of Cherif 1999, sec. 6.2.4, after what it does not list.
-const FAILURES: [&str; 8] = [
+/// Failures 1 to 7 of Cherif 1999, sec. 6.2.4, between what it does not list.
+const FAILURES: [&str; 9] = [
     "moving finger may not change its face",
     "1: moving finger collides",
     "2: moving finger out of reach",
@@ -147,6 +150,7 @@ const FAILURES: [&str; 8] = [
     "5: resting fingertip touches outside its pad",
     "6: weight not balanced",
     "7: resting fingers tell no motion towards the goal",
+    "sub-goal outside the ranges of all resting fingers",
 ];
 
 fn failure(ended: &Ended, counts: &Counts, nearest: Option<(f64, TrackingGrasp)>) -> Failure {

@@ -250,7 +250,7 @@ pub fn search(
     let mut graph = Graph::new(settings, start, goal);
     let nodes_before = counts.nodes;
     let keep_faces = !settings.face_changes || (counts.restarts % 4 < 2) == can_follow(stepper.model, start, goal);
-    let homes = Homes::of(stepper.model, start, keep_faces);
+    let homes = Homes::of(stepper.model, start, keep_faces, settings.range_coverage);
     if graph.nearest.1 <= settings.goal_tolerance {
         return graph.ended(Ok(0));
     }

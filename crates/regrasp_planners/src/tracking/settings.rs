@@ -98,6 +98,11 @@ pub struct TrackingSettings {
     pub roles: RoleChoice,
     /// Longest time of a local plan, in units of `sub_goal_time` (Cherif 1999, sec. 6.2.4, `bound_1`: 2).
     pub local_time: f64,
+    /// Whether the local planner asks for the ranges of orientations R_j (Cherif 1999, sec. 4). Roles are then taken only where the
+    /// range of the fingers that rest has the sub-goal. Where no range has it, all fingertips first go back to their first contacts,
+    /// which makes a new range about the object's orientation. Sub-goals that no range has even then are not tried.
+    /// Needs `resting_fingers = 3` and `fewer_rest = false`.
+    pub range_coverage: bool,
     /// Where forces are.
     pub cones: Cones,
     /// Choices tried in a row before a sub-goal is given up (Cherif 1999, sec. 6.2.4, `bound_2`: 50).
@@ -151,6 +156,7 @@ impl Default for TrackingSettings {
             rolling_finger: RollingFinger::Any,
             roles: RoleChoice::Aligned,
             local_time: 5.0,
+            range_coverage: false,
             cones: Cones::Pyramid,
             trials: 50,
             goal_weight: 1.2,
@@ -198,6 +204,9 @@ impl TrackingSettings {
         }
         if !(2..=3).contains(&self.resting_fingers) {
             return Err(format!("resting_fingers is {}; it must be 2 or 3", self.resting_fingers));
+        }
+        if self.range_coverage && (self.resting_fingers != 3 || self.fewer_rest) {
+            return Err("range_coverage needs three fingers that rest: resting_fingers = 3, fewer_rest = false".into());
         }
         if self.trials == 0 || self.nodes == 0 {
             return Err("trials and nodes are at least 1".into());

@@ -4,6 +4,7 @@
 use crate::tracking::forces::{Forces, Load, Pressing, balance};
 use crate::tracking::grasp::{PerFinger, TrackingGrasp};
 use crate::tracking::object_motion::ObjectMotion;
+use crate::tracking::range::stays_on_its_face;
 use crate::tracking::settings::TrackingSettings;
 use nalgebra::Rotation3;
 use regrasp_geometry::collision::Placement;
@@ -18,8 +19,6 @@ use regrasp_plan::plan::ContactMode;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose, torques};
 
-/// A tip's normal may differ from the face's by this much on a face: rounding. Balls touch edges with normals in between.
-const ON_FACE: f64 = 1e-9;
 /// Corrections of a rolling step that would twist; each gains two digits.
 const UNTWISTINGS: usize = 3;
 /// A fingertip that slides slower than this, in metres per second, neither slides nor rolls for sure: friction has no direction.
@@ -189,7 +188,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
         end.world_from_object = object;
         for (&finger, touch) in resting.iter().zip(&rest_touches) {
             end.touches[finger] = *touch;
-            if !self.stays_on_its_face(&grasp.touches[finger], touch) {
+            if !stays_on_its_face(&model.view.object.surface, &grasp.touches[finger], touch) {
                 return Err(NoStep::BrokenContact(finger));
             }
             if !model.fingers[finger].pad_faces(&grasp.joints[finger], &end.normal_in_world(finger)) {
@@ -206,15 +205,6 @@ impl<'m, 'a> Stepper<'m, 'a> {
             return Err(NoStep::Collision);
         }
         Ok(TrackingStep { roles: asked.roles, seconds: asked.seconds, relative, forces, end })
-    }
-
-    /// True where a ball keeps its face: on smooth surfaces always.
-    fn stays_on_its_face(&self, from: &Touch, to: &Touch) -> bool {
-        let surface = &self.model.view.object.surface;
-        let has_creases = surface.crease_distance(&to.foot).is_finite();
-        !has_creases
-            || ((to.ball.normal - to.foot.normal_in_object.into_inner()).norm() < ON_FACE
-                && surface.same_face(&from.foot, &to.foot))
     }
 
     /// A moving finger at the end of the step.
@@ -267,7 +257,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
             let center = to.point_to_child(&end.world_from_link[moving].point(finger.ik.center_in_body()));
             Touch::of(&model.view.object.surface, &center).ok_or(NoStep::OutOfReach)?
         };
-        if !self.stays_on_its_face(start, &touch) {
+        if !stays_on_its_face(&model.view.object.surface, start, &touch) {
             if is_long {
                 return Err(NoStep::TooLong);
             }

@@ -97,21 +97,68 @@ fn three_fingers_rest_where_fewer_may_not() {
     assert_eq!(also_moving(&plan), 1, "from a start grasp of its own the planner first tries with two");
 }
 
-/// Weight 1, no patience, roles at random, local plans of at most twice the time to a sub-goal, three fingers that rest.
-#[test]
-fn the_choices_of_the_paper_are_settings() {
-    let paper = TrackingSettings {
+/// Cherif 1999, as far as it is settings.
+fn paper() -> TrackingSettings {
+    TrackingSettings {
         goal_weight: 1.0,
         patience: 1_000_000,
         roles: RoleChoice::Random,
         local_time: 2.0,
         fewer_rest: false,
         ..TrackingSettings::default()
-    };
+    }
+}
+
+/// Weight 1, no patience, roles at random, local plans of at most twice the time to a sub-goal, three fingers that rest.
+#[test]
+fn the_choices_of_the_paper_are_settings() {
     let loaded = scene("football.toml");
     let mut query = loaded.tracking(0);
     let start = query.world_from_object_start.rotation;
     query.world_from_object_goal.rotation = UnitQuaternion::from_scaled_axis(Vector::z() * 0.1) * start;
-    let plan = planned(&loaded, &query, &paper, 0).unwrap_or_else(|failure| panic!("{failure}"));
+    let plan = planned(&loaded, &query, &paper(), 0).unwrap_or_else(|failure| panic!("{failure}"));
     assert_eq!((plan.statistics.restarts, also_moving(&plan)), (0, 0));
+}
+
+/// Cherif 1999, sec. 4: plans inside ranges of orientations obey the same laws.
+#[test]
+fn ranges_of_orientations_are_a_setting() {
+    let ranges = TrackingSettings { range_coverage: true, ..paper() };
+    let loaded = scene("football.toml");
+    let mut query = loaded.tracking(0);
+    let start = query.world_from_object_start.rotation;
+    query.world_from_object_goal.rotation = UnitQuaternion::from_scaled_axis(Vector::z() * 0.1) * start;
+    let plan = planned(&loaded, &query, &ranges, 0).unwrap_or_else(|failure| panic!("{failure}"));
+    assert_eq!(also_moving(&plan), 0);
+    assert_eq!(plan, planned(&loaded, &query, &ranges, 0).unwrap());
+}
+
+/// Sec. 4.1.1: the start grasp of the diamond has all its normals in one plane. No three fingertips fix its position, so no range has
+/// any other orientation, and no sub-goal is tried.
+#[test]
+fn a_grasp_with_normals_in_one_plane_has_no_range() {
+    let loaded = scene("diamond.toml");
+    let query = loaded.tracking(0);
+    let plan = planned(&loaded, &query, &paper(), 0).unwrap_or_else(|failure| panic!("{failure}"));
+    let normals: Vec<Vector> =
+        plan.segments[0].waypoints[0].contacts.iter().map(|c| Vector::from(c.normal_in_object.unwrap())).collect();
+    for out in 0..4 {
+        let three: Vec<&Vector> = (0..4).filter(|finger| *finger != out).map(|finger| &normals[finger]).collect();
+        assert!(three[0].dot(&three[1].cross(three[2])).abs() < 1e-9, "{normals:?}");
+    }
+    let ranges = TrackingSettings { range_coverage: true, ..paper() };
+    let failure = plan_tracking(&loaded.view(), &query, &ranges, 0, &Budget::work(WORK), &|_| {}).unwrap_err();
+    let reasons: Vec<&str> = failure.causes.iter().map(|cause| cause.reason.as_str()).collect();
+    assert_eq!(reasons, ["sub-goal outside the ranges of all resting fingers"], "{failure}");
+}
+
+#[test]
+fn ranges_are_refused_where_fewer_than_three_fingers_rest() {
+    let ranges = TrackingSettings { range_coverage: true, ..paper() };
+    assert!(TrackingSettings { fewer_rest: true, ..ranges.clone() }.validate().is_err());
+    assert!(TrackingSettings { resting_fingers: 2, ..ranges.clone() }.validate().is_err());
+    let loaded = scene("three_fingertips.toml");
+    let query = loaded.tracking(0);
+    let failure = plan_tracking(&loaded.view(), &query, &ranges, 0, &Budget::work(1000), &|_| {}).unwrap_err();
+    assert!(failure.message.contains("range_coverage") && failure.statistics.work == 0, "{failure}");
 }
