@@ -100,14 +100,14 @@ impl Tally {
     /// The tries that tell most about a stage: those that came nearest where nothing worked there, else those that failed for the
     /// commonest reason.
     pub fn telling_tries(&self, stage: Stage) -> &[Try] {
-        let own = self.tries.range((stage, 0)..=(stage, usize::MAX)).map(|(_, tries)| tries);
+        let mut own = self.tries.range((stage, 0)..=(stage, usize::MAX)).map(|(_, tries)| tries);
         let count = |tries: &Vec<Try>| {
             let reason = tries.first().map_or_else(String::new, |tried| tried.reason.clone());
             self.reasons.get(&(stage, reason)).copied().unwrap_or_default()
         };
         let chosen = match self.found.contains_key(&stage) {
             true => own.max_by_key(|tries| count(tries)),
-            false => own.last(),
+            false => own.next_back(),
         };
         chosen.map_or(&[], Vec::as_slice)
     }
