@@ -46,10 +46,7 @@ pub fn grow_graph(
     ways: &[Vec<Vec<f64>>],
 ) -> (Roads, usize) {
     let problem = Problem::new(around, query);
-    let model = model(&problem);
-    let of_model = |way: &Vec<Vec<f64>>| way.iter().map(|state| model.configuration_of(state)).collect();
-    let ways: Vec<Vec<Vec<f64>>> = ways.iter().map(of_model).collect();
-    roads.grown_by(&ways, &model, &problem.world)
+    roads.grown_by(ways, &model(&problem), &problem.world)
 }
 
 impl<'a> Problem<'a> {

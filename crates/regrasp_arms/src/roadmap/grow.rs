@@ -9,15 +9,16 @@ use crate::world::World;
 const LINKS: usize = 5;
 
 impl Roads {
-    /// The graph with `ways`, and the number of nodes that they added. A way has configurations of the graph's joints; motions between
-    /// them are straight. `model` and `world` are what the graph was made for: a motion is taken where it is certified for them at
+    /// The graph with `ways`, and the number of nodes that they added. A way has states of the robot, one value per coordinate in radians
+    /// or metres; motions between them are straight. `model` and `world` are what the graph was made for: a motion is taken where it is certified for them at
     /// the graph's clearance, whatever the query knew. What is left out cuts a way into several.
     pub fn grown_by(&self, ways: &[Vec<Vec<f64>>], model: &ArmModel, world: &World) -> (Roads, usize) {
         let settings = ColliderSettings { clearance: self.graph.clearance, ..ColliderSettings::default() };
         let mut exact = Collider::new(model, world, settings);
         let (mut grown, mut n_added) = (self.clone(), 0);
         for way in ways {
-            for part in free_parts(way, &mut exact) {
+            let way: Vec<Vec<f64>> = way.iter().map(|state| model.configuration_of(state)).collect();
+            for part in free_parts(&way, &mut exact) {
                 n_added += part.len();
                 grown.add(part, &mut exact);
             }

@@ -119,7 +119,8 @@ fn a_graph_grows_by_ways_and_leaves_out_what_is_not_free() {
         blocked = (!is_free(&drawn, &drawn)).then_some(drawn);
     }
     let way: Vec<Vec<f64>> = first.iter().cloned().chain(blocked).chain(last.iter().cloned()).collect();
-    let (grown, n_added) = roads.grown_by(std::slice::from_ref(&way), &model, &world);
+    let states = |way: &[Vec<f64>]| -> Vec<Vec<f64>> { way.iter().map(|at| model.state_at(at)).collect() };
+    let (grown, n_added) = roads.grown_by(&[states(&way)], &model, &world);
     let n_before = graph.graph.nodes.len();
     assert_eq!(n_added, 6);
     assert_eq!(grown.graph.graph.nodes[n_before..n_before + 3], way[..3]);
@@ -138,5 +139,5 @@ fn a_graph_grows_by_ways_and_leaves_out_what_is_not_free() {
     // Saved and read, it is the same; nothing is grown by nothing.
     assert_eq!(SuperGraph::from_json(Path::new("graph"), &grown.graph.to_json()).unwrap(), grown.graph);
     assert_eq!(roads.grown_by(&[], &model, &world), (roads.clone(), 0));
-    assert_eq!(roads.grown_by(&[vec![way[0].clone()]], &model, &world), (roads, 0));
+    assert_eq!(roads.grown_by(&[states(&way[..1])], &model, &world), (roads, 0));
 }

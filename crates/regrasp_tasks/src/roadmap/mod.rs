@@ -102,10 +102,7 @@ impl TaskRoadmap {
         let context = Context::new((scene, state), query, (&prepared, &models), settings, (0, &budget))?;
         let mut grown = self.clone();
         if let Some(roads) = &self.roads {
-            let model = graph_model(&context);
-            let of_model = |way: &Vec<Vec<f64>>| way.iter().map(|state| model.configuration_of(state)).collect();
-            let ways: Vec<Vec<Vec<f64>>> = answer.new_ways.iter().map(of_model).collect();
-            grown.roads = Some(roads.grown_by(&ways, &model, &context.fixed).0);
+            grown.roads = Some(roads.grown_by(&answer.new_ways, &graph_model(&context), &context.fixed).0);
         }
         for give in &answer.exchanges {
             let is_same = |own: &Give| own.giver == give.giver && own.taker == give.taker;
