@@ -35,7 +35,20 @@ from ._model import (
 from ._plan import CONTACT_MODES, Plan, Segment
 from ._planning import check, export_mjcf, place, plan, plan_motion, plan_pick_and_place, view
 from ._regrasp import __version__
-from ._result import Cause, Clearance, Failure, Moment, NearestMiss, Progress, Report, Violation
+from ._result import (
+    Cause,
+    Clearance,
+    Failure,
+    MetBody,
+    Moment,
+    NearestMiss,
+    Progress,
+    Report,
+    RobotMiss,
+    TriedExchange,
+    Violation,
+    WantedHand,
+)
 from ._robot_plan import RobotPlan, RobotSegment
 from ._session import QueryTimes, Session, Start
 
@@ -53,6 +66,7 @@ __all__ = [
     "InputFile",
     "InternalError",
     "Joint",
+    "MetBody",
     "Moment",
     "MotionProblem",
     "NearestMiss",
@@ -66,6 +80,7 @@ __all__ = [
     "QueryTimes",
     "RegraspError",
     "Report",
+    "RobotMiss",
     "RobotPlan",
     "RobotSegment",
     "Scene",
@@ -76,7 +91,9 @@ __all__ = [
     "Support",
     "Task",
     "Tip",
+    "TriedExchange",
     "Violation",
+    "WantedHand",
     "__version__",
     "check",
     "check_grasps",

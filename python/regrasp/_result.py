@@ -51,6 +51,83 @@ class NearestMiss:
 
 
 @dataclass(frozen=True)
+class MetBody:
+    """A body that meets another one."""
+
+    name: str
+    kind: str
+    """"link" of the robot, "carried" object, or "resting": a support, an obstacle, another object or robot."""
+
+
+@dataclass(frozen=True, eq=False)
+class WantedHand:
+    """A hand that no posture brings to where it should be."""
+
+    hand: str
+    world_from_hand: Pose
+    """Where its base should be."""
+    joints: tuple[float, ...]
+    """Finger joints there."""
+    wrist_at: tuple[float, float, float]
+    """Where the wrist gets, in the world, in metres."""
+    wrist_wanted: tuple[float, float, float]
+    """Where it should be."""
+
+
+@dataclass(frozen=True)
+class TriedExchange:
+    """A place at which hands were to exchange the object."""
+
+    position: tuple[float, float, float]
+    """Of the object's centre of mass, in the world, in metres."""
+    outcome: str
+    """The furthest that any pair of grasps came there: "hands_touch", "out_of_reach", "in_collision" or "no_way"."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotMiss:
+    """The posture of a robot at which a task came nearest to being done, and what is wrong with it."""
+
+    reason: str
+    """What failed there."""
+    joints: tuple[float, ...]
+    """All joints of the robot, in the order of plans."""
+    world_from_object: Pose | None
+    """The object's pose there; None for motions without an object."""
+    bodies: tuple[MetBody, MetBody] | None
+    """The two that meet, where it is a collision."""
+    overlap: float | None
+    """How deep they overlap, in metres; negative where they are apart; None where one of them is not convex."""
+    wanted: tuple[WantedHand, ...]
+    """Hands that are not where they should be."""
+    exchanges: tuple[TriedExchange, ...]
+    """Places of the exchange that were tried, the best first."""
+
+
+def _robot_miss(fields: Mapping[str, Any]) -> RobotMiss:
+    meeting = fields["meeting"]
+    at = fields["world_from_object"]
+    return RobotMiss(
+        reason=fields["reason"],
+        joints=tuple(fields["joints"]),
+        world_from_object=None if at is None else pose_of(at),
+        bodies=None if meeting is None else (MetBody(**meeting["bodies"][0]), MetBody(**meeting["bodies"][1])),
+        overlap=None if meeting is None else meeting["overlap"],
+        wanted=tuple(
+            WantedHand(
+                hand=entry["hand"],
+                world_from_hand=pose_of(entry["world_from_hand"]),
+                joints=tuple(entry["joints"]),
+                wrist_at=tuple(entry["wrist"][0]),
+                wrist_wanted=tuple(entry["wrist"][1]),
+            )
+            for entry in fields["wanted"]
+        ),
+        exchanges=tuple(TriedExchange(tuple(entry["position"]), entry["outcome"]) for entry in fields["exchanges"]),
+    )
+
+
+@dataclass(frozen=True)
 class Moment:
     """`fraction` of the way from a waypoint to the next one, both of one segment."""
 
@@ -196,6 +273,8 @@ class Failure:
     """Number of the leg that failed, from 1, for queries with way poses."""
     nearest_miss: NearestMiss | None
     """The nearest that the search came, if it got anywhere."""
+    robot_miss: RobotMiss | None
+    """The same for tasks of whole robots."""
     statistics: Mapping[str, Any]
     """Counts of the search, as in a plan file."""
     report: Report | None
@@ -241,6 +320,7 @@ def failure_of(text: str) -> Failure:
             distance_left=miss["distance_left"],
             joints=tuple(miss["joints"]),
         ),
+        robot_miss=None if fields.get("robot_miss") is None else _robot_miss(fields["robot_miss"]),
         statistics=fields["statistics"],
         report=None if report is None else report_of(report),
         rejected_plan=fields.get("rejected_plan"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 
 import regrasp
@@ -53,3 +54,27 @@ obstacles = [{ name = "wall", box = { size = [0.01, 0.01, 0.01] }, position = [0
     assert failure.kind in ("start_invalid", "goal_invalid"), str(failure)
     assert "wall" in failure.message
     assert failure.statistics["work"] <= 1
+
+
+def test_a_task_of_a_robot_says_where_it_came_nearest() -> None:
+    """The posture, the two bodies that meet, the hand that is wanted elsewhere."""
+    scenes = SCENES / "two_arms"
+    failure = regrasp.plan_pick_and_place(scenes / "impossible_start.toml")
+    assert isinstance(failure, regrasp.Failure)
+    miss = failure.robot_miss
+    assert miss is not None and miss.bodies is not None
+    assert all(body.name in str(failure) for body in miss.bodies), str(failure)
+    assert {body.kind for body in miss.bodies} <= {"link", "carried", "resting"}
+
+    failure = regrasp.plan_pick_and_place(scenes / "impossible_reach.toml")
+    assert isinstance(failure, regrasp.Failure)
+    miss = failure.robot_miss
+    assert miss is not None and miss.bodies is None and len(miss.joints) == 42 and miss.world_from_object is not None
+    hand = miss.wanted[0]
+    # The message says how far the wrist would be from the shoulder at least; it does not get nearer than that.
+    least = float(re.search(r"would be (\d+\.\d+) m too far", str(failure))[1])  # type: ignore[index]
+    away = sum((a - b) ** 2 for a, b in zip(hand.wrist_at, hand.wrist_wanted, strict=True)) ** 0.5
+    assert hand.hand == "left" and away >= least - 1e-3
+
+    # In the hand there is none.
+    assert regrasp.plan(SCENES / "box_180x.toml", max_work=2_000).robot_miss is None

@@ -92,6 +92,8 @@ pub struct Hand {
     pub allowed_pairs: BTreeSet<(LinkId, LinkId)>,
     /// Joints that belong to no finger and were given a position, in radians or metres.
     pub held: Vec<(JointId, f64)>,
+    /// Links whose collision geometry was left out: it is no longer in `robot`.
+    pub without_geometry: BTreeSet<LinkId>,
     /// Joints that follow those of other fingers. Empty where those could be held still, unless the hand was loaded for them
     /// ([`crate::import::LoadOptions::untie`]).
     pub ties: Vec<Tie>,

@@ -346,3 +346,42 @@ fn fingers_on_one_motor_are_read_as_they_are_written() {
     };
     assert_eq!(limits(&again), limits(&loaded));
 }
+
+/// A cube fixed to the root, of this size in metres.
+fn box_around(size: f64) -> String {
+    format!(
+        r#"<link name="safety_box"><collision><geometry><box size="{size} {size} {size}"/></geometry></collision></link>
+<joint name="box_joint" type="fixed"><parent link="root"/><child link="safety_box"/><origin xyz="0 0 0.05"/></joint>
+"#
+    )
+}
+
+#[test]
+fn a_volume_around_all_fingertips_is_left_out_and_written_down() {
+    let folder = tempfile::tempdir().unwrap();
+    let fingers = finger("i", "root") + &finger("t", "root");
+    let parts = box_around(0.4) + &fingers;
+    let loaded = load(folder.path(), &parts, "", "hand.urdf", None).unwrap();
+    let hand = &loaded.hand;
+    let names: Vec<&str> = hand.without_geometry.iter().map(|link| hand.robot.links[link.0].name.as_str()).collect();
+    assert_eq!((names, hand.palm.len()), (vec!["safety_box"], 0));
+    let note = "link \"safety_box\" touches most fingertips in every posture";
+    assert!(loaded.notes.iter().any(|text| text.starts_with(note)), "{:?}", loaded.notes);
+
+    // The file that is written says so; without the line the geometry is the hand's.
+    let text = regrasp_robot::inspect::hand_file_text(hand, "hand.urdf", &std::collections::BTreeSet::new());
+    let line = "without_geometry = [\"safety_box\"]\n";
+    assert!(text.contains(line), "{text}");
+    let read = load(folder.path(), &parts, &text, "hand.toml", None).unwrap();
+    assert_eq!((&read.hand.without_geometry, read.hand.palm.len()), (&hand.without_geometry, 0));
+    let read = load(folder.path(), &parts, &text.replace(line, ""), "hand.toml", None).unwrap();
+    assert_eq!((read.hand.without_geometry.len(), read.hand.palm.len()), (0, 1));
+
+    // What fingertips can leave is a part of the hand.
+    let loaded = guess(&(box_around(0.04) + &fingers), None).unwrap();
+    assert_eq!((loaded.hand.without_geometry.len(), loaded.hand.palm.len()), (0, 1));
+
+    let unknown = text.replace("[\"safety_box\"]", "[\"safety_bax\"]");
+    let messages = load(folder.path(), &parts, &unknown, "hand.toml", None).unwrap_err();
+    assert!(messages[0].contains("U205") && fix(&messages).contains("safety_box"), "{messages:?}");
+}

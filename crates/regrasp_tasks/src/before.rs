@@ -119,7 +119,8 @@ fn refuse_reach(
             let mount = (world_from_hand * own.hand_from_mount).translation.vector;
             let by = (mount - origin.coords).norm() - reach;
             let missed = if by > 0.0 {
-                (by, format!("the wrist of the hand \"{}\" would be {by:.3} m too far", context.hand_name(hand)))
+                let length = if by < 5e-4 { "less than 0.001".to_owned() } else { format!("{by:.3}") };
+                (by, format!("the wrist of the hand \"{}\" would be {length} m too far", context.hand_name(hand)))
             } else if has_common {
                 return Ok(());
             } else {

@@ -50,7 +50,10 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
         let files = (arguments.urdf.as_path(), arguments.srdf.as_deref());
         let whole = inspect_whole(found.tree.clone(), files, &options, &settings, &mut rng)?;
         match whole {
-            Some(whole) => return inspect_robot::run(&found, &whole, arguments, common, talk),
+            Some(whole) => {
+                whole.notes.iter().for_each(|note| talk.note(note));
+                return inspect_robot::run(&found, &whole, arguments, common, talk);
+            }
             None if arguments.robot || arguments.srdf.is_some() => {
                 let diagnostic = Diagnostic::new("U214", Place::file(&arguments.urdf), "has no arm")
                     .expected("six moving joints that follow each other without a branch");

@@ -147,7 +147,9 @@ fn hand() -> Hand {
         }
     }
     let palm = robot.links[0].collision.iter().map(|p| PalmShape { link: LinkId(0), placed: p.clone() }).collect();
-    Hand { robot: Arc::new(robot), base: LinkId(0), fingers, palm, allowed_pairs, ties: Vec::new(), held: Vec::new() }
+    let without_geometry = BTreeSet::new();
+    let (ties, held) = (Vec::new(), Vec::new());
+    Hand { robot: Arc::new(robot), base: LinkId(0), fingers, palm, allowed_pairs, ties, held, without_geometry }
 }
 
 /// The object: a sphere whose centre of mass is its centre.

@@ -20,6 +20,9 @@ const FRICTIONS: [f64; 2] = [1.0, 1.5];
 /// Torsion radius of the soft fingertips that are tried, in metres.
 const SOFT: f64 = 0.005;
 
+/// Share of the failures for want of contact forces from which on a lighter object is tried.
+const WEAK_SHARE: f64 = 1.0 / 3.0;
+
 /// How advice begins that names a start.
 pub const START_AT: &str = "start at ";
 
@@ -44,14 +47,25 @@ pub fn advise(asked: &Asked, settings: &InHandSettings, budget: &Budget, failure
         let changed = Asked { view, query, progress: &|_| {}, ..*asked };
         plan_with(&changed, &short, &limits, work).is_ok()
     };
-    if let Some(told) = first_that_helps(asked, &mut solves) {
+    if let Some(told) = first_that_helps(asked, failure, &mut solves) {
         failure.advice =
             format!("{told}: with that a search of {work} configurations found a plan. Or {}", failure.advice);
     }
 }
 
+/// The share of all failures of a search that are for want of contact forces.
+fn no_forces_share(failure: &Failure) -> f64 {
+    let counts = &failure.statistics.failures;
+    let total: u64 = counts.values().sum();
+    counts.get("no_forces").map_or(0.0, |&count| count as f64 / total.max(1) as f64)
+}
+
 /// The first change with which `solves` finds a plan, in words.
-fn first_that_helps(asked: &Asked, solves: &mut dyn FnMut(&HandView, &InHandQuery) -> bool) -> Option<String> {
+fn first_that_helps(
+    asked: &Asked,
+    failure: &Failure,
+    solves: &mut dyn FnMut(&HandView, &InHandQuery) -> bool,
+) -> Option<String> {
     let Asked { view, query, .. } = *asked;
     if query.start_grasp == GraspRequest::Automatic && query.goal_grasp == GraspRequest::Automatic {
         let towards = towards_palm(view.hand, &(query.world_from_object_start * view.object.center_of_mass).coords);
@@ -70,6 +84,12 @@ fn first_that_helps(asked: &Asked, solves: &mut dyn FnMut(&HandView, &InHandQuer
         let object = Object { friction, ..view.object.clone() };
         if solves(&HandView { object: &object, ..view.clone() }, query) {
             return Some(format!("friction = {friction} instead of {} (fingertips of rubber)", view.object.friction));
+        }
+    }
+    if no_forces_share(failure) >= WEAK_SHARE {
+        let lighter = Object { mass: 0.5 * view.object.mass, ..view.object.clone() };
+        if solves(&HandView { object: &lighter, ..view.clone() }, query) {
+            return Some(format!("mass = {} instead of {}, or stronger motors", lighter.mass, view.object.mass));
         }
     }
     let mut hand = view.hand.clone();

@@ -67,7 +67,16 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
     let held =
         spec.held.iter().filter(|(joint, _)| !owner.contains_key(joint)).map(|(&joint, &at)| (joint, at)).collect();
     found.into_result((
-        Hand { robot: robot.clone(), base: spec.base, fingers, palm, allowed_pairs, held, ties: Vec::new() },
+        Hand {
+            robot: robot.clone(),
+            base: spec.base,
+            fingers,
+            palm,
+            allowed_pairs,
+            held,
+            without_geometry: spec.without_geometry.clone(),
+            ties: Vec::new(),
+        },
         notes,
     ))
 }

@@ -8,12 +8,13 @@ use super::fixes;
 use super::names::{known_joint, known_link};
 use super::options::{LoadOptions, LoadedInput};
 use super::shared_motors;
-use super::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
+use super::spec::{FingerSpec, HandSpec, PadSpec, TipSpec, leave_geometry_out};
 use super::srdf::{LoadedSrdf, load_srdf};
 use super::ties;
 use super::urdf::{LoadedRobot, load_robot};
 use crate::contact_model::{self, ContactModel};
 use crate::hand::{Hand, MAX_FINGERS};
+use crate::inspect::enclosing::{enclosing_links, enclosing_note};
 use crate::robot::{JointId, LinkId, Robot};
 use nalgebra::{Quaternion, UnitQuaternion};
 use regrasp_base::diagnostic::did_you_mean;
@@ -68,8 +69,15 @@ pub fn load_hand(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Input
 }
 
 fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
-    let parts = guessed_parts(path, options)?;
-    let (mut hand, more) = made(&parts, path, options)?;
+    let mut parts = guessed_parts(path, options)?;
+    let (mut hand, mut more) = made(&parts, path, options)?;
+    let enclosing = enclosing_links(&hand);
+    if !enclosing.is_empty() {
+        parts.notes.extend(enclosing.iter().map(|&link| enclosing_note(&parts.robot, link)));
+        leave_geometry_out(Arc::make_mut(&mut parts.robot), enclosing.iter().copied());
+        parts.spec.without_geometry = enclosing;
+        (hand, more) = made(&parts, path, options)?;
+    }
     crate::inspect::rest::bend_towards_palm(&mut hand);
     ties::settle_rest(&mut hand);
     refuse_wrong_unit(&hand, path)?;
@@ -196,6 +204,7 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     let allow = root.optional("allow");
     let couplings = root.optional("couplings");
     let held = root.optional("held");
+    let without_geometry = root.optional("without_geometry");
     let inspect = fixes::inspect_command(urdf.as_ref().and_then(Entry::as_text), path);
     let fingers = root.required(found, "fingers", &inspect);
     root.finish(found);
@@ -204,6 +213,10 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     if let Some(entry) = couplings {
         couplings::read(&entry, &mut robot, found);
     }
+    let without_geometry: BTreeSet<LinkId> = without_geometry
+        .and_then(|entry| entry.entries(found, "a list of links"))
+        .map_or_else(BTreeSet::new, |links| links.iter().filter_map(|link| known_link(link, &robot, found)).collect());
+    leave_geometry_out(&mut robot, without_geometry.iter().copied());
     let robot = Arc::new(robot);
     let base = base.and_then(|entry| known_link(&entry, &robot, found)).unwrap_or(robot.root);
     let mut allow = allow.map_or_else(BTreeSet::new, |entry| read_pairs(&entry, &robot, found));
@@ -215,7 +228,8 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
         inputs.push(loaded.input);
     }
     let held = held.map_or_else(BTreeMap::new, |entry| read_held(&entry, &robot, found));
-    Some(Parts { robot, spec: HandSpec { base, fingers, mount: None, allow, held }, inputs })
+    let spec = HandSpec { base, fingers, mount: None, allow, held, without_geometry };
+    Some(Parts { robot, spec, inputs })
 }
 
 /// Positions of joints that belong to no finger.

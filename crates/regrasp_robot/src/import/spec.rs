@@ -1,7 +1,7 @@
 //! What a hand is to be made of, by the ids of a robot.
 
 use crate::contact_model::ContactModel;
-use crate::robot::{JointId, LinkId};
+use crate::robot::{JointId, LinkId, Robot};
 use nalgebra::UnitQuaternion;
 use regrasp_base::Place;
 use regrasp_geometry::{Point, Pose, UnitVector, Vector};
@@ -20,6 +20,13 @@ pub(crate) struct HandSpec {
     pub allow: BTreeSet<(LinkId, LinkId)>,
     /// Positions of joints that belong to no finger, in radians or metres; others are held as near to zero as their limits let them.
     pub held: BTreeMap<JointId, f64>,
+    /// Links whose collision geometry is left out; the robot has none of it.
+    pub without_geometry: BTreeSet<LinkId>,
+}
+
+/// Takes the collision geometry of `links` out of `robot`.
+pub(crate) fn leave_geometry_out(robot: &mut Robot, links: impl IntoIterator<Item = LinkId>) {
+    links.into_iter().for_each(|link| robot.links[link.0].collision.clear());
 }
 
 /// Positions by name of joint, each with its place.

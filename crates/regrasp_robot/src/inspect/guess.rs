@@ -59,7 +59,14 @@ pub(crate) fn guess_hand(robot: &Robot, options: &LoadOptions, file: &Path) -> R
         place: Place::file(file),
     });
     let fingers = fingers.collect();
-    let mut spec = HandSpec { base, fingers, mount: None, allow: BTreeSet::new(), held: BTreeMap::new() };
+    let mut spec = HandSpec {
+        base,
+        fingers,
+        mount: None,
+        allow: BTreeSet::new(),
+        held: BTreeMap::new(),
+        without_geometry: BTreeSet::new(),
+    };
     shared_motors::place_held_leaders(robot, &mut spec);
     Ok(spec)
 }

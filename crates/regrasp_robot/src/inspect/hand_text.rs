@@ -49,6 +49,14 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
         }
         let _ = writeln!(text, "]");
     }
+    if !hand.without_geometry.is_empty() {
+        let links: Vec<String> = hand.without_geometry.iter().map(|&link| name(link)).collect();
+        let _ = writeln!(
+            text,
+            "\n# Links whose collision geometry is left out.\nwithout_geometry = [{}]",
+            links.join(", ")
+        );
+    }
     if !hand.held.is_empty() {
         let _ = writeln!(text, "\n# Joints that belong to no finger, and where they are held.\n[held]");
         for &(joint, position) in &hand.held {

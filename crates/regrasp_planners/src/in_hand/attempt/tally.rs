@@ -50,6 +50,9 @@ impl Release {
     }
 }
 
+/// Joints that are named at most.
+const MOST_NAMED: usize = 4;
+
 /// Counts per reason.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
@@ -75,6 +78,31 @@ impl Tally {
     /// How many failures there were for `reason`.
     pub fn count(&self, reason: Reason) -> u64 {
         self.counts.get(&reason).copied().unwrap_or(0)
+    }
+
+    /// The joints that are too weak to hold the object, in words, those that fail most often first; None unless they are at least a third of all
+    /// failures.
+    pub fn weak_joints(&self, model: &Model) -> Option<String> {
+        let mut weak: Vec<(u64, usize, usize)> = Vec::new();
+        for (reason, &count) in &self.counts {
+            if let Reason::NoForces(Unbalanced::TooWeak(finger, joint)) = *reason {
+                weak.push((count, finger, joint));
+            }
+        }
+        weak.sort_by_key(|&(count, finger, joint)| (std::cmp::Reverse(count), finger, joint));
+        let n_weak: u64 = weak.iter().map(|(count, ..)| count).sum();
+        let total: u64 = self.counts.values().sum();
+        let &(_, finger, joint) = weak.first().filter(|_| 3 * n_weak >= total)?;
+        let names: Vec<String> = weak
+            .iter()
+            .take(MOST_NAMED)
+            .map(|&(_, finger, joint)| format!("\"{}\"", model.view.hand.fingers[finger].chain.names[joint]))
+            .collect();
+        Some(format!(
+            "{}; the effort limits in the URDF say how strong joints are: {}",
+            Unbalanced::TooWeak(finger, joint).in_words(model),
+            names.join(", ")
+        ))
     }
 
     /// One more transfer that stopped short of the goal because fingertips would have to turn by `turn` about a contact normal.

@@ -56,9 +56,12 @@ const BATCH: usize = 4;
 /// Poses from which every turn was found, at which no more are looked for; so many are searched from again.
 const ENOUGH: usize = 2;
 const AGAIN: usize = 4;
-/// Work of a short search, and of the second one from the best poses.
-const PROBE_WORK: [u64; 2] = [25_000, 60_000];
-/// What is added to the plans found and to the work for a rate of plans that is never zero nor infinite.
+/// Times that it is searched again where no turn was found.
+const TIMES_AGAIN: u64 = 3;
+/// Work of a short search, and of those made again from the best poses.
+const PROBE_WORK: (u64, u64) = (25_000, 60_000);
+/// What is added to the plans found and to the work for a rate of plans that is never zero nor infinite; the first for a pose whose searches
+/// came all the way.
 const PRIOR: (f64, f64) = (0.2, 4_000.0);
 /// Poses count as different from this distance on, in metres, with angles weighed by the object's radius.
 const APART: f64 = 0.006;
@@ -195,8 +198,8 @@ fn reach_of(model: &Model, reach: &TipReach) -> TipReach {
 /// How near a contact is to one of those spread over an object, in metres, about.
 const NEARBY: f64 = 0.008;
 
-/// Makes short searches from places, best first, until some turn out well, and again from the best of these. The answer does not depend
-/// on the number of threads.
+/// Makes short searches from places, best first, until some turn out well, and again from the best of these; where none was found, some
+/// more times from those that seem best by then. The answer does not depend on the number of threads.
 fn search_from(
     places: &mut [Place],
     view: &HandView,
@@ -205,11 +208,11 @@ fn search_from(
     tried: &mut Tried,
 ) -> Result<(), Failure> {
     // Several places at the same time. What one thread would not have come to, because the work is spent, does not count.
-    let mut search = |places: &mut [&mut Place], round: usize| -> Result<usize, Failure> {
+    let search = |places: &mut [&mut Place], round: u64, tried: &mut Tried| -> Result<usize, Failure> {
         // Another seed than that of the plan: what is asked is how often a plan is found.
-        let seed = seed.wrapping_add(1 + round as u64);
-        let probe_all =
-            |place: &Place| probe(view, queries, &place.world_from_object, (settings, seed, budget), PROBE_WORK[round]);
+        let seed = seed.wrapping_add(1 + round);
+        let work = if round == 0 { PROBE_WORK.0 } else { PROBE_WORK.1 };
+        let probe_all = |place: &Place| probe(view, queries, &place.world_from_object, (settings, seed, budget), work);
         let mut n_searched = 0;
         for together in places.chunks_mut(settings.n_threads.max(1)) {
             if budget.check(tried.work).is_err() {
@@ -231,18 +234,25 @@ fn search_from(
         }
         Ok(n_searched)
     };
-    for batch in places.chunks_mut(BATCH).take(PROBED / BATCH) {
-        let mut batch: Vec<&mut Place> = batch.iter_mut().collect();
-        let n_searched = search(&mut batch, 0)?;
-        tried.probed += n_searched as u64;
-        tried.solved += batch[..n_searched].iter().filter(|place| place.is_solved()).count() as u64;
-        if tried.solved >= ENOUGH as u64 {
+    let n_solved = |places: &[Place]| places.iter().filter(|place| place.is_solved()).count();
+    for first in (0..places.len().min(PROBED)).step_by(BATCH) {
+        let last = (first + BATCH).min(places.len());
+        let mut batch: Vec<&mut Place> = places[first..last].iter_mut().collect();
+        tried.probed += search(&mut batch, 0, tried)? as u64;
+        if n_solved(places) >= ENOUGH {
             break;
         }
     }
-    places.sort_by(|a, b| b.rate().total_cmp(&a.rate()));
-    let mut again: Vec<&mut Place> = places.iter_mut().take(AGAIN).filter(|place| !place.probes.is_empty()).collect();
-    search(&mut again, 1)?;
+    for round in 1..=TIMES_AGAIN {
+        places.sort_by(|a, b| b.rate().total_cmp(&a.rate()));
+        let n_again = places.iter().take(AGAIN).take_while(|place| !place.probes.is_empty()).count();
+        let mut again: Vec<&mut Place> = places.iter_mut().take(n_again).collect();
+        let n_searched = search(&mut again, round, tried)?;
+        if n_searched == 0 || n_solved(places) > 0 || queries.iter().all(InHandQuery::stays) {
+            break;
+        }
+    }
+    tried.solved = n_solved(places) as u64;
     Ok(())
 }
 
@@ -265,10 +275,15 @@ impl Place {
         !self.probes.is_empty() && self.probes.iter().all(Probe::is_solved)
     }
 
-    /// Plans found per work, of the turn for which they are fewest; 0 where nobody searched.
+    /// Plans found per work, of the turn for which they are fewest; 0 where nobody searched. Searches without a plan count the more the farther
+    /// they came, and the less the more there were.
     fn rate(&self) -> f64 {
         let (solved, work) = PRIOR;
-        let rate = |probe: &Probe| (f64::from(probe.n_solved) + solved) / (probe.work as f64 + work);
+        let prior = |probe: &Probe| match probe.n_solved {
+            0 => solved * probe.mean_way().powi(2),
+            _ => solved,
+        };
+        let rate = |probe: &Probe| (f64::from(probe.n_solved) + prior(probe)) / (probe.work as f64 + work);
         self.probes.iter().map(rate).reduce(f64::min).unwrap_or(0.0)
     }
 }

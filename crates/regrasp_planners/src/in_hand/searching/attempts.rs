@@ -93,7 +93,12 @@ impl Left {
             Interrupt::WorkSpent => "allow more work (--max-work, max_work)",
             Interrupt::Deadline | Interrupt::Cancelled => "allow more time (--time-limit, time_limit)",
         };
+        let weak = self.tally.weak_joints(model);
         let advice = match causes.first() {
+            _ if weak.is_some() => {
+                let weak = weak.unwrap_or_default();
+                format!("lower the mass of the object, or use stronger motors: {weak}")
+            }
             _ if in_the_way.is_some() => {
                 "let `regrasp inspect` on the URDF write fingertips that nothing stands out of, or shrink the links' collision \
                  geometry where it is larger than the links"

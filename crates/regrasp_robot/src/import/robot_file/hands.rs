@@ -3,7 +3,7 @@
 use super::super::assemble::assemble;
 use super::super::hand_file::{HandParts, hand_file_parts, locate, refuse_wrong_unit};
 use super::super::names::known_link;
-use super::super::spec::{FingerSpec, HandSpec};
+use super::super::spec::{FingerSpec, HandSpec, leave_geometry_out};
 use super::super::ties;
 use super::Draft;
 use super::arms::ArmSpec;
@@ -148,6 +148,7 @@ fn read_hand(
         }
     };
     let spec = in_tree(&parts.spec, &place, mount);
+    leave_geometry_out(&mut draft.tree, spec.without_geometry.iter().copied());
     let top = top_of(&draft.tree, spec.base, Some(mount));
     Some(Mount { name, arm, top, spec, file, place: stands })
 }
@@ -229,6 +230,7 @@ fn in_tree(spec: &HandSpec, place: &Place, mount: LinkId) -> HandSpec {
         allow: spec.allow.iter().map(|&(a, b)| (place.link(a), place.link(b))).collect(),
         // On a robot they are coordinates like others.
         held: BTreeMap::new(),
+        without_geometry: spec.without_geometry.iter().map(|&link| place.link(link)).collect(),
     }
 }
 

@@ -7,10 +7,12 @@ mod text;
 /// Links that touch.
 mod touch;
 
+use super::enclosing::{enclosing_links, enclosing_note};
 use super::guess::guess_hand;
 use super::{InspectSettings, PairTable};
 use crate::hand::Hand;
 use crate::import::assemble::assemble;
+use crate::import::spec::{HandSpec, leave_geometry_out};
 use crate::import::srdf::LoadedSrdf;
 use crate::import::{LoadOptions, srdf::load_srdf};
 use crate::robot::Robot;
@@ -43,6 +45,8 @@ pub struct WholeRobot {
     pub pairs: PairTable,
     /// The SRDF.
     pub srdf: Option<LoadedSrdf>,
+    /// Remarks.
+    pub notes: Vec<String>,
 }
 
 /// The parts of `robot`, which was read from `file`. None for a robot without an arm.
@@ -60,16 +64,34 @@ pub fn inspect_whole(
     if guess.arms.is_empty() {
         return Ok(None);
     }
-    let make = |guess: &HandGuess| {
+    let guessed = |guess: &HandGuess| {
         let base = Some(robot.links[guess.base.0].name.clone());
-        let spec = guess_hand(&robot, &LoadOptions { base, ..options.clone() }, file)?;
+        guess_hand(&robot, &LoadOptions { base, ..options.clone() }, file)
+    };
+    let mut specs: Vec<Result<HandSpec, InputError>> = guess.hands.iter().map(guessed).collect();
+    let (mut cleared, mut notes) = ((*robot).clone(), Vec::new());
+    for spec in specs.iter_mut().flatten() {
+        // With what the mount link carries rigidly, which is the arm's otherwise.
+        let Ok((hand, _)) = assemble(&robot, spec, file) else { continue };
+        spec.without_geometry = enclosing_links(&hand);
+        notes.extend(spec.without_geometry.iter().map(|&link| enclosing_note(&robot, link)));
+        leave_geometry_out(&mut cleared, spec.without_geometry.iter().copied());
+    }
+    let robot = Arc::new(cleared);
+    let make = |guess: &HandGuess, spec: Result<HandSpec, InputError>| {
+        let spec = spec?;
         // What the arm's mount link carries rigidly is the arm's.
-        let spec = crate::import::spec::HandSpec { mount: Some(mount_of(&robot, guess)), ..spec };
+        let spec = HandSpec { mount: Some(mount_of(&robot, guess)), ..spec };
         let (mut hand, _) = assemble(&robot, &spec, file)?;
         super::rest::bend_towards_palm(&mut hand);
         Ok(hand)
     };
-    let hands = guess.hands.iter().map(|guess| FoundHand { guess: guess.clone(), hand: make(guess) }).collect();
+    let hands = guess
+        .hands
+        .iter()
+        .zip(specs)
+        .map(|(guess, spec)| FoundHand { guess: guess.clone(), hand: make(guess, spec) })
+        .collect();
     let allowed: BTreeSet<_> =
         srdf.iter().flat_map(|loaded| loaded.srdf.disabled_pairs.iter().map(|pair| pair.links)).collect();
     let pairs = touch::count(&robot, &allowed, settings.n_postures, rng).map_err(|no_posture| {
@@ -77,7 +99,7 @@ pub fn inspect_whole(
             .element("joint", &no_posture.joint)
             .expected("limits that overlap")
     })?;
-    Ok(Some(WholeRobot { robot, guess, hands, pairs, srdf }))
+    Ok(Some(WholeRobot { robot, guess, hands, pairs, srdf, notes }))
 }
 
 /// The link above the palm, which the hand does not own.
