@@ -124,6 +124,21 @@ fn shared_robots_are_understood_and_their_files_load() {
         let common: Vec<String> =
             robot.layout.coordinates[robot.layout.range(Part::Common)].iter().map(|c| c.name.clone()).collect();
         assert_eq!(common, names(&whole.guess.common));
+        // The boxes around TIAGo's hands are left out, of hands and robot, and nothing else is.
+        let mut left_out = Vec::new();
+        for (found, read) in whole.hands.iter().filter_map(|hand| hand.hand.as_ref().ok()).zip(&robot.hands) {
+            let name = |of: &regrasp_robot::Robot, id: &regrasp_robot::LinkId| of.links[id.0].name.clone();
+            let names: Vec<String> = found.without_geometry.iter().map(|id| name(&found.robot, id)).collect();
+            let again = &read.hand.without_geometry;
+            assert_eq!(names, again.iter().map(|id| name(&robot.robot, id)).collect::<Vec<_>>());
+            assert!(again.iter().all(|id| robot.robot.links[id.0].collision.is_empty()));
+            left_out.extend(names);
+        }
+        left_out.sort();
+        let is_tiago = urdf.ends_with("tiago_dual.urdf");
+        let boxes = ["hand_left_safety_box", "hand_right_safety_box"];
+        assert_eq!(left_out, if is_tiago { boxes.to_vec() } else { vec![] }, "{}", urdf.display());
+        assert_eq!(whole.notes.len(), left_out.len());
         // Pairs that always touch are excused, pairs that never do are not.
         for [a, b] in &whole.pairs.always {
             let link = |name: &str| robot.robot.link_named(name).unwrap();

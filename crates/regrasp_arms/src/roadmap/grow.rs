@@ -10,8 +10,8 @@ const LINKS: usize = 5;
 
 impl Roads {
     /// The graph with `ways`, and the number of nodes that they added. A way has states of the robot, one value per coordinate in radians
-    /// or metres; motions between them are straight. `model` and `world` are what the graph was made for: a motion is taken where it is certified for them at
-    /// the graph's clearance, whatever the query knew. What is left out cuts a way into several.
+    /// or metres; motions between them are straight. `model` and `world` are what the graph was made for: a motion is taken where it is
+    /// certified for them at the graph's clearance, whatever the query knew. What is left out cuts a way into several.
     pub fn grown_by(&self, ways: &[Vec<Vec<f64>>], model: &ArmModel, world: &World) -> (Roads, usize) {
         let settings = ColliderSettings { clearance: self.graph.clearance, ..ColliderSettings::default() };
         let mut exact = Collider::new(model, world, settings);

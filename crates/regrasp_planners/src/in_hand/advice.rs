@@ -1,5 +1,6 @@
 //! What would have helped a search that failed: single changes of the scene, each tried by a short search of its own.
 
+use crate::in_hand::attempt::tally::OFTEN;
 use crate::in_hand::{Asked, plan_with};
 use crate::settings::{InHandSettings, Method, SearchSettings};
 use regrasp_base::Budget;
@@ -19,9 +20,6 @@ const SHIFT: f64 = 0.008;
 const FRICTIONS: [f64; 2] = [1.0, 1.5];
 /// Torsion radius of the soft fingertips that are tried, in metres.
 const SOFT: f64 = 0.005;
-
-/// Share of the failures for want of contact forces from which on a lighter object is tried.
-const WEAK_SHARE: f64 = 1.0 / 3.0;
 
 /// How advice begins that names a start.
 pub const START_AT: &str = "start at ";
@@ -86,10 +84,10 @@ fn first_that_helps(
             return Some(format!("friction = {friction} instead of {} (fingertips of rubber)", view.object.friction));
         }
     }
-    if no_forces_share(failure) >= WEAK_SHARE {
+    if no_forces_share(failure) >= OFTEN {
         let lighter = Object { mass: 0.5 * view.object.mass, ..view.object.clone() };
         if solves(&HandView { object: &lighter, ..view.clone() }, query) {
-            return Some(format!("mass = {} instead of {}, or stronger motors", lighter.mass, view.object.mass));
+            return Some(format!("mass = {} instead of {}", lighter.mass, view.object.mass));
         }
     }
     let mut hand = view.hand.clone();

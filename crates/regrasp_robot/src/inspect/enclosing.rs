@@ -15,9 +15,9 @@ const POSTURES: usize = 100;
 /// What a hand really has lets its fingertips away, or the hand would never hold anything with them.
 pub(crate) fn enclosing_links(hand: &Hand) -> BTreeSet<LinkId> {
     let touch = Touch::new(hand);
-    let palm: BTreeSet<LinkId> = hand.palm.iter().map(|shape| shape.link).filter(|&link| link != hand.base).collect();
+    let mut enclosing: BTreeSet<LinkId> =
+        hand.palm.iter().map(|shape| shape.link).filter(|&link| link != hand.base).collect();
     let tips: BTreeSet<LinkId> = hand.fingers.iter().map(|finger| finger.tip.link).collect();
-    let mut enclosing = palm;
     let mut rng = Rng::keyed(0, "enclosing", 0);
     for _ in 0..POSTURES {
         if enclosing.is_empty() {
@@ -26,8 +26,9 @@ pub(crate) fn enclosing_links(hand: &Hand) -> BTreeSet<LinkId> {
         let touching = touch.touching(&touch.draw_posture(&mut rng));
         let n_tips = |link: LinkId| {
             let pairs = touch.pairs.iter().zip(&touching).filter(|(_, touches)| **touches);
-            let with = pairs.filter(|((a, b), _)| (*a == link && tips.contains(b)) || (*b == link && tips.contains(a)));
-            with.count()
+            let meets_tip =
+                |(a, b): (LinkId, LinkId)| (a == link && tips.contains(&b)) || (b == link && tips.contains(&a));
+            pairs.filter(|(pair, _)| meets_tip(**pair)).count()
         };
         enclosing.retain(|&link| 2 * n_tips(link) > tips.len());
     }

@@ -1,8 +1,8 @@
 //! What a robot and a hand are like: joints, limits, meshes, units, fingers and tips, links that always or never touch.
 
-/// Names of fingers.
 /// Collision geometry that encloses the fingers.
 pub(crate) mod enclosing;
+/// Names of fingers.
 mod finger_names;
 /// Fingers and tips guessed from a robot alone.
 pub(crate) mod guess;

@@ -50,6 +50,9 @@ impl Release {
     }
 }
 
+/// Share of all failures from which on what is behind them is worth a change of the task.
+pub const OFTEN: f64 = 1.0 / 3.0;
+
 /// Joints that are named at most.
 const MOST_NAMED: usize = 4;
 
@@ -80,8 +83,8 @@ impl Tally {
         self.counts.get(&reason).copied().unwrap_or(0)
     }
 
-    /// The joints that are too weak to hold the object, in words, those that fail most often first; None unless they are at least a third of all
-    /// failures.
+    /// The joints that are too weak to hold the object, in words, those that fail most often first; None unless they are [`OFTEN`] the
+    /// cause.
     pub fn weak_joints(&self, model: &Model) -> Option<String> {
         let mut weak: Vec<(u64, usize, usize)> = Vec::new();
         for (reason, &count) in &self.counts {
@@ -92,7 +95,7 @@ impl Tally {
         weak.sort_by_key(|&(count, finger, joint)| (std::cmp::Reverse(count), finger, joint));
         let n_weak: u64 = weak.iter().map(|(count, ..)| count).sum();
         let total: u64 = self.counts.values().sum();
-        let &(_, finger, joint) = weak.first().filter(|_| 3 * n_weak >= total)?;
+        let &(_, finger, joint) = weak.first().filter(|_| n_weak as f64 >= OFTEN * total as f64)?;
         let names: Vec<String> = weak
             .iter()
             .take(MOST_NAMED)

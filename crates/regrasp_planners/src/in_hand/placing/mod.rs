@@ -245,8 +245,8 @@ fn search_from(
     }
     for round in 1..=TIMES_AGAIN {
         places.sort_by(|a, b| b.rate().total_cmp(&a.rate()));
-        let n_again = places.iter().take(AGAIN).take_while(|place| !place.probes.is_empty()).count();
-        let mut again: Vec<&mut Place> = places.iter_mut().take(n_again).collect();
+        let mut again: Vec<&mut Place> =
+            places.iter_mut().take(AGAIN).filter(|place| !place.probes.is_empty()).collect();
         let n_searched = search(&mut again, round, tried)?;
         if n_searched == 0 || n_solved(places) > 0 || queries.iter().all(InHandQuery::stays) {
             break;

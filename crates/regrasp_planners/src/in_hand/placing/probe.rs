@@ -3,9 +3,9 @@
 use crate::in_hand::{Asked, plan_with};
 use crate::settings::{InHandSettings, SearchSettings};
 use regrasp_base::Budget;
+use regrasp_geometry::Pose;
 use regrasp_geometry::frame::pose_distance;
-use regrasp_geometry::{Pose, frame};
-use regrasp_manipulation::failure::Failure;
+use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::in_world::plan_in_world;
 use regrasp_manipulation::progress::Progress;
 use regrasp_plan::Plan;
@@ -47,21 +47,17 @@ impl Probe {
 /// The share of the way from start to goal, over all legs, that a failed search for `query` has behind it where it came nearest, in 0..1.
 /// `turn_length` weighs angles, in metres.
 fn way_behind(query: &InHandQuery, failure: &Failure, turn_length: f64) -> f64 {
-    let Some(miss) = &failure.nearest_miss else { return 0.0 };
-    let nearest = Pose::from(&miss.world_from_object);
+    // Refusals before the search have no way behind them.
+    let has_searched = matches!(failure.kind, FailureKind::WorkSpent | FailureKind::TimeLimit);
+    let Some(miss) = failure.nearest_miss.as_ref().filter(|_| has_searched) else { return 0.0 };
     let poses = query.poses();
-    let far = |a: &Pose, b: &Pose| pose_distance(a, b, turn_length);
-    let mut behind = 0.0;
-    let mut best: f64 = 0.0;
-    for leg in poses.windows(2) {
-        let length = far(&leg[0], &leg[1]);
-        // The miss is of one of the legs, of that whose end it is measured to.
-        if (frame::rotation_between(&nearest, &leg[1]).norm() - miss.angle_left).abs() < 1e-6 {
-            best = best.max(behind + (length - far(&nearest, &leg[1])).max(0.0));
-        }
-        behind += length;
-    }
-    if behind > 0.0 { best / behind } else { 0.0 }
+    let legs: Vec<f64> = poses.windows(2).map(|leg| pose_distance(&leg[0], &leg[1], turn_length)).collect();
+    let way: f64 = legs.iter().sum();
+    // The miss is measured to the end of the leg that failed; a query of one leg does not number it.
+    let failed = failure.leg.unwrap_or(1) - 1;
+    let left = miss.distance_left + turn_length * miss.angle_left;
+    let behind = legs[..failed].iter().sum::<f64>() + (legs[failed] - left).max(0.0);
+    if way > 0.0 { behind / way } else { 0.0 }
 }
 
 /// Searches from `world_from_object` for every query, each with `work`. Errors: the caller asked to stop.
@@ -89,7 +85,7 @@ pub fn probe(
                 ways: Vec::new(),
                 plan: Some(Box::new(plan_in_world(view, &query.name, plan))),
             },
-            Err(failure) if failure.kind == regrasp_manipulation::failure::FailureKind::Interrupted => {
+            Err(failure) if failure.kind == FailureKind::Interrupted => {
                 return Err(failure);
             }
             Err(failure) => Probe {
@@ -101,4 +97,53 @@ pub fn probe(
         });
     }
     Ok(probes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+    use regrasp_manipulation::failure::NearestMiss;
+    use regrasp_plan::plan::PoseData;
+    use regrasp_robot::LoadOptions;
+
+    /// A search that stopped short of the end of its leg by `angle_left`, in radians, and `distance_left`, in metres.
+    fn short_of(kind: FailureKind, leg: Option<usize>, angle_left: f64, distance_left: f64) -> Failure {
+        let world_from_object = PoseData::from(&Pose::identity());
+        let miss = NearestMiss { world_from_object, angle_left, distance_left, joints: Vec::new() };
+        Failure { leg, nearest_miss: Some(Box::new(miss)), ..Failure::bare(kind, String::new(), "") }
+    }
+
+    #[test]
+    fn the_way_behind_is_measured_over_all_legs() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
+        let loaded = regrasp_scene::load_scene(&path, &LoadOptions::default()).unwrap();
+        let query = loaded.task().query(0).as_in_hand().unwrap().clone();
+        let start = query.world_from_object_start;
+        let moved = |angle: f64, along: f64| {
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), angle);
+            Pose::from_parts(start.translation * Translation3::new(along, 0.0, 0.0), turn * start.rotation)
+        };
+        // A turn by 1 rad, which counts as 0.05 m, and then 0.05 m along x.
+        let one =
+            InHandQuery { world_from_object_goal: moved(1.0, 0.0), world_from_object_way: vec![], ..query.clone() };
+        let two = InHandQuery {
+            world_from_object_way: vec![moved(1.0, 0.0)],
+            world_from_object_goal: moved(1.0, 0.05),
+            ..query.clone()
+        };
+        let spent = FailureKind::WorkSpent;
+        for (query, failure, expected) in [
+            (&one, short_of(spent, None, 0.25, 0.0), 0.75),
+            (&one, short_of(spent, None, 0.25, 0.0125), 0.5),
+            (&one, short_of(spent, None, 3.0, 0.0), 0.0),
+            (&one, short_of(FailureKind::StartInvalid, None, 0.0, 0.0), 0.0),
+            (&one, Failure::bare(spent, String::new(), ""), 0.0),
+            (&two, short_of(spent, Some(1), 0.0, 0.0), 0.5),
+            (&two, short_of(spent, Some(2), 0.0, 0.025), 0.75),
+        ] {
+            let way = way_behind(query, &failure, 0.05);
+            assert!((way - expected).abs() < 1e-9, "{way} {expected}");
+        }
+    }
 }

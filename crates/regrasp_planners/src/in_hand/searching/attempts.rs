@@ -93,22 +93,18 @@ impl Left {
             Interrupt::WorkSpent => "allow more work (--max-work, max_work)",
             Interrupt::Deadline | Interrupt::Cancelled => "allow more time (--time-limit, time_limit)",
         };
-        let weak = self.tally.weak_joints(model);
-        let advice = match causes.first() {
-            _ if weak.is_some() => {
-                let weak = weak.unwrap_or_default();
-                format!("lower the mass of the object, or use stronger motors: {weak}")
-            }
+        let advice = match (self.tally.weak_joints(model), causes.first()) {
+            (Some(weak), _) => format!("lower the mass of the object, or use stronger motors: {weak}"),
             _ if in_the_way.is_some() => {
                 "let `regrasp inspect` on the URDF write fingertips that nothing stands out of, or shrink the links' collision \
                  geometry where it is larger than the links"
                     .into()
             }
-            Some(cause) if nearest_miss.is_none() => {
+            (None, Some(cause)) if nearest_miss.is_none() => {
                 format!("move the start pose to where the fingers reach around the object (mostly: {})", cause.reason)
             }
-            Some(cause) => format!("{more}, or ease what stops it most: {}", cause.reason),
-            None => more.into(),
+            (None, Some(cause)) => format!("{more}, or ease what stops it most: {}", cause.reason),
+            (None, None) => more.into(),
         };
         Failure {
             kind: interrupt.into(),
