@@ -294,6 +294,10 @@ impl NumericIk {
             }
             error_before = error_now;
             let wish = preference.filter(|_| n > 3 && i < effort.preference_steps);
+            // Where something slides no bound proves it below, and what is there must not count as crawling.
+            if wish.is_none() && self.reach.is_infinite() && error_now < 0.5 * POSITION_TOLERANCE {
+                return linear::keeps(&linear, &coordinates).then(|| coordinates[..n].iter().copied().collect());
+            }
             let step = match linear.as_slice() {
                 [] => bounded_step(&state, &error, wish, &coordinates, &limits)?,
                 sums => linear::limited_step(&state, &error, wish, &coordinates, (&limits, sums))?,

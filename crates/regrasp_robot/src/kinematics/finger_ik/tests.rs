@@ -229,6 +229,25 @@ fn numeric_solves_nearly_all_reachable_targets_of_random_chains() {
     assert!(worst > 0.9, "{worst}");
 }
 
+/// `chain` with joint `which` sliding, by 35 mm.
+fn with_slide(chain: &Chain, which: usize) -> Chain {
+    let (mut joints, mut lower, mut upper) = (chain.joints.clone(), chain.lower.clone(), chain.upper.clone());
+    joints[which].motion = JointMotion::Slide;
+    (lower[which], upper[which]) = (-0.01, 0.025);
+    Chain::new(joints, chain.names.clone(), lower, upper)
+}
+
+#[test]
+fn numeric_solves_nearly_all_reachable_targets_of_chains_with_slides() {
+    let mut rng = Rng::keyed(19, "slides", 0);
+    for (n, which) in [(4, 0), (4, 2), (5, 1), (3, 0)] {
+        let (turning, center) = random_turning(n, 1.0, &mut rng);
+        let ik = FingerIk::new(&with_slide(&turning, which), &center);
+        let (plain, turned) = (success(&ik, 400, false, &mut rng), success(&ik, 400, true, &mut rng));
+        assert!(plain > 0.9 && turned > 0.9, "{n} joints, {which} slides: {plain} {turned}");
+    }
+}
+
 #[test]
 fn numeric_finds_the_branches_of_the_closed_form() {
     let mut rng = Rng::keyed(8, "both", 0);
