@@ -373,9 +373,19 @@ impl<'a> Table<'a> {
 
     /// The value of `key`. Errors: missing (`missing_key`), with `fix`.
     pub fn required(&mut self, found: &mut Found, key: &'static str, fix: &str) -> Option<Entry<'a>> {
+        self.required_or(found, key, || fix.to_owned())
+    }
+
+    /// The same with a fix that takes time to find, and is sought only where the key is missing.
+    pub fn required_or(
+        &mut self,
+        found: &mut Found,
+        key: &'static str,
+        fix: impl FnOnce() -> String,
+    ) -> Option<Entry<'a>> {
         let entry = self.optional(key);
         if entry.is_none() {
-            let diagnostic = self.error(found.codes.missing_key, found, format!("has no `{key}`")).fix(fix);
+            let diagnostic = self.error(found.codes.missing_key, found, format!("has no `{key}`")).fix(fix());
             found.diagnostics.push(diagnostic);
         }
         entry

@@ -198,7 +198,7 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     if !root.is_of_format(found, FORMAT, VERSION) {
         return None;
     }
-    let urdf = root.required(found, "urdf", &fixes::add_urdf(path));
+    let urdf = root.required_or(found, "urdf", || fixes::add_urdf(path));
     let srdf = root.optional("srdf");
     let base = root.optional("base_link");
     let allow = root.optional("allow");
@@ -354,7 +354,7 @@ fn read_finger(
 ) -> Option<FingerSpec> {
     let name = table.required(found, "name", "add name = \"thumb\"").and_then(|entry| entry.name(found));
     let tip_link = table
-        .required(found, "tip_link", &fixes::add_tip_link(robot))
+        .required_or(found, "tip_link", || fixes::add_tip_link(robot))
         .and_then(|entry| known_link(&entry, robot, found));
     let first_joint = table.optional("first_joint").map(|entry| known_joint(&entry, robot, found));
     let tip = table
