@@ -347,6 +347,26 @@ fn fingers_on_one_motor_are_read_as_they_are_written() {
     assert_eq!(limits(&again), limits(&loaded));
 }
 
+/// A finger of three joints on the root, with a capsule on each link; the one in the middle is `middle` long, in metres.
+fn phalanges(name: &str, middle: f64) -> String {
+    let links = [
+        ("root".to_owned(), "a", [0.03, 0.0], 0.03),
+        (format!("{name}_a"), "b", [0.0, 0.03], middle),
+        (format!("{name}_b"), "c", [0.0, middle], 0.03),
+    ];
+    let mut text = String::new();
+    for (parent, link, [x, z], length) in links {
+        let _ = write!(
+            text,
+            r#"<link name="{name}_{link}"><collision><origin xyz="0 0 {}"/><geometry><capsule radius="0.005" length="{length}"/></geometry></collision></link>
+<joint name="{name}_{link}_joint" type="revolute"><parent link="{parent}"/><child link="{name}_{link}"/><origin xyz="{x} 0 {z}"/><axis xyz="0 1 0"/><limit lower="-0.4" upper="0.8"/></joint>
+"#,
+            0.5 * length
+        );
+    }
+    text
+}
+
 /// A cube fixed to the root, of this size in metres.
 fn box_around(size: f64) -> String {
     format!(
@@ -384,4 +404,27 @@ fn a_volume_around_all_fingertips_is_left_out_and_written_down() {
     let unknown = text.replace("[\"safety_box\"]", "[\"safety_bax\"]");
     let messages = load(folder.path(), &parts, &unknown, "hand.toml", None).unwrap_err();
     assert!(messages[0].contains("U205") && fix(&messages).contains("safety_box"), "{messages:?}");
+}
+
+#[test]
+fn links_of_a_finger_that_are_always_near_each_other_are_not_tested() {
+    let folder = tempfile::tempdir().unwrap();
+    let parts = phalanges("i", 0.008) + &phalanges("t", 0.03);
+    let loaded = load(folder.path(), &parts, "", "hand.urdf", None).unwrap();
+    let may_touch = |loaded: &LoadedHand, [a, b]: [&str; 2]| {
+        let link = |name: &str| loaded.hand.robot.link_named(name).unwrap();
+        loaded.hand.may_touch(link(a), link(b))
+    };
+    assert!(may_touch(&loaded, ["i_a", "i_c"]) && !may_touch(&loaded, ["t_a", "t_c"]));
+    assert!(!may_touch(&loaded, ["i_a", "t_c"]));
+    let note = "links of one finger that are within 1 mm of each other in most postures are not tested against each other";
+    let said: Vec<&String> = loaded.notes.iter().filter(|text| text.starts_with(note)).collect();
+    assert!(said.len() == 1 && said[0].ends_with(": \"i_a\" and \"i_c\""), "{:?}", loaded.notes);
+
+    // The file that is written says so.
+    let text = regrasp_robot::inspect::hand_file_text(&loaded.hand, "hand.urdf", &std::collections::BTreeSet::new());
+    let read = load(folder.path(), &parts, &text, "hand.toml", None).unwrap();
+    assert_eq!(read.hand.allowed_pairs, loaded.hand.allowed_pairs);
+    let loaded = guess(&(phalanges("i", 0.03) + &phalanges("t", 0.03)), None).unwrap();
+    assert!(!may_touch(&loaded, ["i_a", "i_c"]) && !loaded.notes.iter().any(|text| text.starts_with(note)));
 }

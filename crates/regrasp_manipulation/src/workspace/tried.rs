@@ -36,6 +36,16 @@ impl Tried {
         }
     }
 
+    /// What is most often in `finger`'s way at the contacts tried, in words; None where few were tried or nothing was in the way.
+    pub fn most_in_the_way(&self, model: &Model, finger: usize) -> Option<String> {
+        let tried = *self.contacts.get(&finger)?;
+        let of_finger = self.blocked.iter().filter(|((f, _), _)| *f == finger);
+        let ((_, pair), count) = of_finger.max_by_key(|(key, count)| (**count, std::cmp::Reverse(*key)))?;
+        let [a, b] = [pair.a, pair.b].map(|body| &model.bodies[body].name);
+        let share = 100.0 * *count as f64 / tried as f64;
+        (tried >= FEWEST).then(|| format!("\"{a}\" and \"{b}\" meet at {share:.0} % of the {tried} contacts that it reaches"))
+    }
+
     /// The links of fingers that touch the object before their tips do, at most contacts, in words; None where there are none.
     pub fn in_words(&self, model: &Model) -> Option<String> {
         let told: Vec<String> = self

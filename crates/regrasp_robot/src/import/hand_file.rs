@@ -14,6 +14,7 @@ use super::ties;
 use super::urdf::{LoadedRobot, load_robot};
 use crate::contact_model::{self, ContactModel};
 use crate::hand::{Hand, MAX_FINGERS};
+use crate::inspect::crowded::{crowded_note, crowded_pairs};
 use crate::inspect::enclosing::{enclosing_links, enclosing_note};
 use crate::robot::{JointId, LinkId, Robot};
 use nalgebra::{Quaternion, UnitQuaternion};
@@ -76,6 +77,12 @@ fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
         parts.notes.extend(enclosing.iter().map(|&link| enclosing_note(&parts.robot, link)));
         leave_geometry_out(Arc::make_mut(&mut parts.robot), enclosing.iter().copied());
         parts.spec.without_geometry = enclosing;
+        (hand, more) = made(&parts, path, options)?;
+    }
+    let crowded = crowded_pairs(&hand);
+    if !crowded.is_empty() {
+        parts.notes.push(crowded_note(&parts.robot, &crowded));
+        parts.spec.allow.extend(crowded);
         (hand, more) = made(&parts, path, options)?;
     }
     crate::inspect::rest::bend_towards_palm(&mut hand);

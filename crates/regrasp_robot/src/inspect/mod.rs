@@ -1,5 +1,7 @@
 //! What a robot and a hand are like: joints, limits, meshes, units, fingers and tips, links that always or never touch.
 
+/// Links of one finger that are always near each other.
+pub(crate) mod crowded;
 /// Collision geometry that encloses the fingers.
 pub(crate) mod enclosing;
 /// Names of fingers.

@@ -92,6 +92,16 @@ impl<'h> Touch<'h> {
         blocked
     }
 
+    /// Per pair, whether it is of one finger and nearer than `distance` in `posture`.
+    pub fn near_in_fingers(&self, posture: &[Vec<f64>], distance: f64) -> Vec<bool> {
+        let at = self.placed(posture);
+        let finger = |shape: usize| self.shapes[shape].body.map(|(finger, _)| finger);
+        let is_near = |pair: &(usize, usize)| {
+            finger(pair.0).is_some() && finger(pair.0) == finger(pair.1) && self.shapes_are_within(&at, pair, distance)
+        };
+        self.shape_pairs.iter().map(|pairs| pairs.iter().any(is_near)).collect()
+    }
+
     /// Where every shape is, and the centre of its bounding ball.
     fn placed(&self, posture: &[Vec<f64>]) -> Vec<(Placement, Point)> {
         let bodies: Vec<Vec<Pose>> = self

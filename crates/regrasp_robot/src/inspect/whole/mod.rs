@@ -7,6 +7,7 @@ mod text;
 /// Links that touch.
 mod touch;
 
+use super::crowded::{crowded_note, crowded_pairs};
 use super::enclosing::{enclosing_links, enclosing_note};
 use super::guess::guess_hand;
 use super::{InspectSettings, PairTable};
@@ -76,6 +77,11 @@ pub fn inspect_whole(
         spec.without_geometry = enclosing_links(&hand);
         notes.extend(spec.without_geometry.iter().map(|&link| enclosing_note(&robot, link)));
         leave_geometry_out(&mut cleared, spec.without_geometry.iter().copied());
+        let crowded = crowded_pairs(&hand);
+        if !crowded.is_empty() {
+            notes.push(crowded_note(&robot, &crowded));
+            spec.allow.extend(crowded);
+        }
     }
     let robot = Arc::new(cleared);
     let make = |guess: &HandGuess, spec: Result<HandSpec, InputError>| {
