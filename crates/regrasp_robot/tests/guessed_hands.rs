@@ -417,7 +417,8 @@ fn links_of_a_finger_that_are_always_near_each_other_are_not_tested() {
     };
     assert!(may_touch(&loaded, ["i_a", "i_c"]) && !may_touch(&loaded, ["t_a", "t_c"]));
     assert!(!may_touch(&loaded, ["i_a", "t_c"]));
-    let note = "links of one finger that are within 1 mm of each other in most postures are not tested against each other";
+    let note =
+        "links of one finger that are within 1 mm of each other in most postures are not tested against each other";
     let said: Vec<&String> = loaded.notes.iter().filter(|text| text.starts_with(note)).collect();
     assert!(said.len() == 1 && said[0].ends_with(": \"i_a\" and \"i_c\""), "{:?}", loaded.notes);
 

@@ -139,7 +139,8 @@ fn shared_robots_are_understood_and_their_files_load() {
         let boxes = ["hand_left_safety_box", "hand_right_safety_box"];
         assert_eq!(left_out, if is_tiago { boxes.to_vec() } else { vec![] }, "{}", urdf.display());
         // So are pairs of phalanges of TIAGo's fingers, whose hulls reach into each other.
-        let crowded = whole.notes.iter().filter(|note| note.starts_with("links of one finger that are within 1 mm")).count();
+        let crowded =
+            whole.notes.iter().filter(|note| note.starts_with("links of one finger that are within 1 mm")).count();
         assert_eq!((crowded, whole.notes.len()), (if is_tiago { 2 } else { 0 }, left_out.len() + crowded));
         // Pairs that always touch are excused, pairs that never do are not.
         for [a, b] in &whole.pairs.always {

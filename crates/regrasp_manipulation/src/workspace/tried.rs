@@ -43,7 +43,8 @@ impl Tried {
         let ((_, pair), count) = of_finger.max_by_key(|(key, count)| (**count, std::cmp::Reverse(*key)))?;
         let [a, b] = [pair.a, pair.b].map(|body| &model.bodies[body].name);
         let share = 100.0 * *count as f64 / tried as f64;
-        (tried >= FEWEST).then(|| format!("\"{a}\" and \"{b}\" meet at {share:.0} % of the {tried} contacts that it reaches"))
+        (tried >= FEWEST)
+            .then(|| format!("\"{a}\" and \"{b}\" meet at {share:.0} % of the {tried} contacts that it reaches"))
     }
 
     /// The links of fingers that touch the object before their tips do, at most contacts, in words; None where there are none.

@@ -35,7 +35,10 @@ pub fn advise(model: &Model, ends: [&Pose; 2], seed: u64, failure: &mut Failure)
     let of = |key: &str| counts.get(key).copied().unwrap_or(0) as f64;
     let total: f64 = counts.values().map(|&count| count as f64).sum();
     let is_open = matches!(failure.kind, FailureKind::WorkSpent | FailureKind::TimeLimit);
-    if !is_open || !model.may_release || of("not_closed") + of("not_released") < CLOSURE_SHARE * total.max(1.0) {
+    if !is_open
+        || !model.may_release
+        || of("not_closed") + of("not_released") + of("no_order") < CLOSURE_SHARE * total.max(1.0)
+    {
         return;
     }
     let Some((n_grasps, lifts)) = lifts(model, ends, seed) else { return };

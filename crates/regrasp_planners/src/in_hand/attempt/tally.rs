@@ -17,6 +17,8 @@ pub enum Reason {
     NotClosed,
     /// A closed grasp was found, but the fingers find no free way to it in any order.
     NoWayOver,
+    /// A closed grasp was found and some finger may move to it, but then no order remains in which the others always hold the object.
+    NoOrder,
     /// A closed grasp was found that this finger has to leave its contact for, but the others do not hold without it.
     Bound(usize),
     /// A transfer stopped at once: a finger reaches no farther.
@@ -173,6 +175,9 @@ impl Tally {
                     Reason::NoContact(f) => format!("finger \"{}\" found no contact within its reach", finger_name(f)),
                     Reason::NotClosed => "found no grasp that still holds the object after one finger lifts".into(),
                     Reason::NoWayOver => "found no collision-free path for the fingers to the next grasp".into(),
+                    Reason::NoOrder => {
+                        "found no order of moving the fingers in which the others always hold the object".into()
+                    }
                     Reason::Bound(f) => {
                         format!(
                             "finger \"{}\" cannot lift: the other fingers would not hold the object",
@@ -212,6 +217,7 @@ impl Tally {
                 Reason::NoContact(_) => "no_contact",
                 Reason::NotClosed => "not_closed",
                 Reason::NoWayOver => "no_way_over",
+                Reason::NoOrder => "no_order",
                 Reason::Bound(_) => "not_released",
                 Reason::OutOfReach => "out_of_reach",
                 Reason::TooNear(_) => "too_near",

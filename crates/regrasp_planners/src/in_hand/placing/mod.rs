@@ -427,7 +427,8 @@ fn not_found(model: &Model, best: &[(f64, Pose)], tally: &Tally, tried: &Tried, 
             .zip(0..)
             .map(|(finger, f)| {
                 let n = tally.count(Reason::NoContact(f));
-                let in_the_way = || tally.tried.most_in_the_way(model, f).map_or(String::new(), |told| format!(" ({told})"));
+                let in_the_way =
+                    || tally.tried.most_in_the_way(model, f).map_or(String::new(), |told| format!(" ({told})"));
                 match n {
                     0 => String::new(),
                     n => format!("; \"{}\" found no contact at {n} of them{}", finger.name, in_the_way()),

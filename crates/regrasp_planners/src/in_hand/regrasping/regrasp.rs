@@ -21,6 +21,13 @@ pub struct Tried {
 }
 
 impl Tried {
+    /// True when a relocation on a way to `goal` was tried and has no path, with every finger where it was or where `goal` has it.
+    pub fn failed_towards(&self, goal: &Choice) -> bool {
+        let is_on_way =
+            |before: &Choice| before.iter().zip(goal).all(|(&option, &wanted)| option == 0 || option == wanted);
+        self.known.iter().any(|(before, f, option, path)| path.is_none() && *option == goal[*f] && is_on_way(before))
+    }
+
     /// True when this relocation was tried and has no path.
     fn failed(&self, before: &Choice, finger: usize, option: usize) -> bool {
         self.known.iter().any(|(c, f, o, path)| path.is_none() && *f == finger && *o == option && c == before)

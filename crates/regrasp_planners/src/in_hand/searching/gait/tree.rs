@@ -6,7 +6,7 @@ use crate::in_hand::attempt::tally::Reason;
 use crate::in_hand::grasps::candidate::{Candidate, Choice, Way, clear_share, follow_share};
 use crate::in_hand::grasps::choose::choose_grasp;
 use crate::in_hand::grasps::closure_table::ClosureTable;
-use crate::in_hand::grasps::combine::{most_free, rank};
+use crate::in_hand::grasps::combine::{Ranked, most_free, rank};
 use crate::in_hand::grasps::free::{draw_leavable, free_posture, free_posture_at};
 use crate::in_hand::grasps::freedom::Freedom;
 use crate::in_hand::grasps::pool::Pool;
@@ -14,7 +14,7 @@ use crate::in_hand::moving::spin;
 use crate::in_hand::moving::spin::{Arrival, LOOP_REACH};
 use crate::in_hand::moving::transfer::{is_carried_out, transfer};
 use crate::in_hand::refusals::is_stuck;
-use crate::in_hand::regrasping::regrasp::{Tried, regrasp};
+use crate::in_hand::regrasping::regrasp::{ChangeGoal, Tried, regrasp, regrasp_over};
 use crate::in_hand::regrasping::unlock::{draw_bound_finger, unlock};
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
@@ -226,20 +226,56 @@ fn extend(search: &mut Search, tree: &mut Tree, node: usize, target: &Pose) -> O
         match way {
             Some(way) => return advance(search, tree, node, target, way),
             None if tried.lacks_forces => {}
-            None => note_stuck(search, &mut table, &combination.choice),
+            None => note_stuck(search, &mut table, &combination.choice, &tried),
         }
     }
-    None
+    drop(table);
+    if search.n_nodes < DETOUR_NODES || tried.lacks_forces {
+        return None;
+    }
+    let way = detour(search, &state, options, &ranked, &mut tree.places[place].pool)?;
+    advance(search, tree, node, target, way)
 }
 
+/// Relocations from `state` over third contacts to one of the grasps `ranked` among `options`, none of which is reached by moving each finger
+/// at most once.
+fn detour(
+    search: &mut Search,
+    state: &GraspState,
+    mut options: Vec<Vec<Candidate>>,
+    ranked: &[Ranked],
+    pool: &mut Pool,
+) -> Option<Sequence> {
+    for (finger, of_finger) in options.iter_mut().enumerate() {
+        of_finger.extend(pool.any(search, finger, DETOUR_CONTACTS));
+    }
+    let mut table = ClosureTable::new(search.model(), &options);
+    let away = |choice: &Choice, goal: &Choice| choice.iter().zip(goal).filter(|(a, b)| a != b).count();
+    let goal = ChangeGoal {
+        is_there: |choice: &Choice| ranked.iter().any(|ranked| ranked.choice == *choice),
+        n_away: |choice: &Choice| ranked.iter().map(|r| away(choice, &r.choice)).min().unwrap_or(0) as f64,
+    };
+    let mut rng = Rng::child(&search.rng, "detour", 0);
+    search.rng.bits();
+    regrasp_over(&mut search.workspace, state, &options, &goal, &mut table, DETOUR_RELOCATIONS, &mut rng)
+}
+
+/// Nodes from which on extensions make detours: easy queries are solved by then. By measurement, 18 seeds with 400,000 configurations each:
+/// allegro/cylinder20_x is solved 9 times with detours and 3 times without, LEAP's cube 11 times and 15 times.
+const DETOUR_NODES: u64 = 30;
+/// Third contacts per finger. By hand.
+const DETOUR_CONTACTS: usize = 4;
+/// Relocations tried for one. By hand.
+const DETOUR_RELOCATIONS: usize = 12;
+
 /// Takes note of a combination that could not be reached: for want of release if no finger that has to move may be the
-/// first.
-fn note_stuck(search: &mut Search, table: &mut ClosureTable, goal: &Choice) {
+/// first, else for want of a path of a finger, or of an order.
+fn note_stuck(search: &mut Search, table: &mut ClosureTable, goal: &Choice, tried: &Tried) {
     let present: Choice = goal.iter().map(|_| 0).collect();
     let holding = table.holding(&present);
     let moving = || (0..goal.len()).filter(|&finger| goal[finger] != 0);
     if moving().any(|finger| table.is_closed(&present, holding & !(1 << finger))) {
-        search.tally.add(Reason::NoWayOver);
+        search.tally.add(if tried.failed_towards(goal) { Reason::NoWayOver } else { Reason::NoOrder });
         return;
     }
     moving().for_each(|finger| search.tally.add(Reason::Bound(finger)));
