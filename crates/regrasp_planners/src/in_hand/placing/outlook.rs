@@ -2,13 +2,12 @@
 //! their sets close while one finger is away. Links may be in the way: that is asked later, of few poses.
 
 use super::samples::ContactSamples;
-use arrayvec::ArrayVec;
 use regrasp_base::Rng;
+use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
-use regrasp_geometry::{Pose, Vector};
 use regrasp_grasp::ContactModel;
 use regrasp_manipulation::grasp::state::MAX_FINGERS;
-use regrasp_manipulation::model::{FingerModel, Model};
+use regrasp_manipulation::model::Model;
 use regrasp_robot::inspect::TipReach;
 use regrasp_robot::inspect::reach::{DIRECTIONS, directions};
 
@@ -18,45 +17,13 @@ const LEAST_COSINE: f64 = -0.2;
 /// Share that stands for none, so that worths of poles apart can be compared.
 const NONE: f64 = 1e-5;
 
-/// Facets along each edge of a cube whose faces tell normals apart: by 5 degrees.
-const FACETS: usize = 24;
-
-/// Which facet of the cube the direction goes through.
-fn facet_of(direction: &Vector) -> usize {
-    let axis = direction.iamax();
-    let side = usize::from(direction[axis] < 0.0);
-    let along = |axis: usize, largest: f64| {
-        let share = 0.5 + 0.5 * direction[axis] / largest;
-        ((share * FACETS as f64) as usize).min(FACETS - 1)
-    };
-    let largest = direction[axis].abs().max(f64::MIN_POSITIVE);
-    let (u, v) = (along((axis + 1) % 3, largest), along((axis + 2) % 3, largest));
-    ((2 * axis + side) * FACETS + u) * FACETS + v
-}
-
-/// The directions through the middles of all facets, in order.
-fn facets() -> impl Iterator<Item = Vector> {
-    let middle = |k: usize| 2.0 * (k as f64 + 0.5) / FACETS as f64 - 1.0;
-    (0..6 * FACETS * FACETS).map(move |facet| {
-        let (face, u, v) = (facet / (FACETS * FACETS), facet / FACETS % FACETS, facet % FACETS);
-        let (axis, sign) = (face / 2, if face % 2 == 0 { 1.0 } else { -1.0 });
-        let mut direction = Vector::zeros();
-        direction[axis] = sign;
-        direction[(axis + 1) % 3] = middle(u);
-        direction[(axis + 2) % 3] = middle(v);
-        direction.normalize()
-    })
-}
-
 /// Estimates poses.
 #[derive(Debug)]
 pub struct Outlook<'m> {
     model: &'m Model<'m>,
     reach: &'m TipReach,
     samples: ContactSamples,
-    directions: [Vector; DIRECTIONS],
-    /// Of fingers whose tip is no ball: from its centre to the point that touches, with the link as at rest, by [`facet_of`] the normal.
-    arms: ArrayVec<Option<Vec<Vector>>, MAX_FINGERS>,
+    directions: [regrasp_geometry::Vector; DIRECTIONS],
 }
 
 impl<'m> Outlook<'m> {
@@ -67,11 +34,7 @@ impl<'m> Outlook<'m> {
 
     /// The same with contacts that are known.
     pub fn with(model: &'m Model<'m>, reach: &'m TipReach, samples: ContactSamples) -> Self {
-        let arms_of = |finger: &FingerModel| -> Vec<Vector> {
-            facets().map(|normal| finger.arm(&finger.link_at_rest, &normal)).collect()
-        };
-        let arms = model.fingers.iter().map(|finger| finger.curved.map(|_| arms_of(finger))).collect();
-        Outlook { model, reach, samples, directions: directions(), arms }
+        Outlook { model, reach, samples, directions: directions() }
     }
 
     /// Per finger, the spread contacts that its tip reaches with the object at a pose, as bits.
@@ -85,11 +48,7 @@ impl<'m> Outlook<'m> {
                 outward |= u32::from(direction.dot(&normal) >= LEAST_COSINE) << index;
             }
             for (f, finger) in self.model.fingers.iter().enumerate() {
-                let center = match &self.arms[f] {
-                    None => finger.center_over(&placement, contact),
-                    // To look the arm up is enough for the voxels of the reach.
-                    Some(arms) => placement.point(&contact.point_in_object) - arms[facet_of(&normal)],
-                };
+                let center = finger.center_over(&placement, contact);
                 let from = self.reach.directions_at(&center).map_or(0, |fingers| fingers[f]);
                 reached[f] |= u64::from(from & outward != 0) << bit;
             }
@@ -132,24 +91,5 @@ impl<'m> Outlook<'m> {
     /// The worth of no grasp at all.
     pub fn nothing(&self) -> f64 {
         NONE * 1.000_001
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_facet_is_where_its_middle_is_and_near_all_that_goes_through_it() {
-        let middles: Vec<Vector> = facets().collect();
-        for (facet, middle) in middles.iter().enumerate() {
-            assert_eq!(facet_of(middle), facet);
-        }
-        let mut rng = Rng::keyed(1, "facets", 0);
-        let farthest = (0..10_000).map(|_| {
-            let direction = Vector::from(rng.direction());
-            direction.angle(&middles[facet_of(&direction)])
-        });
-        assert!(farthest.fold(0.0, f64::max) < 3.5f64.to_radians());
     }
 }
