@@ -14,8 +14,7 @@ use super::ties;
 use super::urdf::{LoadedRobot, load_robot};
 use crate::contact_model::{self, ContactModel};
 use crate::hand::{Hand, MAX_FINGERS};
-use crate::inspect::crowded::{crowded_note, crowded_pairs};
-use crate::inspect::enclosing::{enclosing_links, enclosing_note};
+use crate::inspect::guess::leave_out_what_blocks;
 use crate::robot::{JointId, LinkId, Robot};
 use nalgebra::{Quaternion, UnitQuaternion};
 use regrasp_base::diagnostic::did_you_mean;
@@ -72,17 +71,10 @@ pub fn load_hand(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Input
 fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, InputError> {
     let mut parts = guessed_parts(path, options)?;
     let (mut hand, mut more) = made(&parts, path, options)?;
-    let enclosing = enclosing_links(&hand);
-    if !enclosing.is_empty() {
-        parts.notes.extend(enclosing.iter().map(|&link| enclosing_note(&parts.robot, link)));
-        leave_geometry_out(Arc::make_mut(&mut parts.robot), enclosing.iter().copied());
-        parts.spec.without_geometry = enclosing;
-        (hand, more) = made(&parts, path, options)?;
-    }
-    let crowded = crowded_pairs(&hand);
-    if !crowded.is_empty() {
-        parts.notes.push(crowded_note(&parts.robot, &crowded));
-        parts.spec.allow.extend(crowded);
+    let blocks = leave_out_what_blocks(&parts.robot, &hand, &mut parts.spec);
+    if !blocks.is_empty() {
+        parts.notes.extend(blocks);
+        leave_geometry_out(Arc::make_mut(&mut parts.robot), parts.spec.without_geometry.iter().copied());
         (hand, more) = made(&parts, path, options)?;
     }
     crate::inspect::rest::bend_towards_palm(&mut hand);

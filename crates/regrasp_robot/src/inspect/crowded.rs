@@ -11,8 +11,8 @@ use std::collections::BTreeSet;
 const POSTURES: usize = 100;
 /// Distance within which links are in each other's way, in metres: what the first search of a plan keeps.
 const NEAR: f64 = 0.001;
-/// Share of the postures from which on a pair is excused. By hand: parts of a joint with two axes, on the thumb of a real hand, meet in 0.66 of
-/// the postures and in 0.77 of the contacts, and the next pair of links in 0.3.
+/// Share of the postures from which on a pair is excused. By hand: of the thumb of TIAGo's Hey5 hand, the hulls of the link that spreads and the next
+/// one meet in 0.66 of the postures. With these two tested it finds no contact at all.
 const MOSTLY: f64 = 0.5;
 
 /// Pairs of links of one finger, smaller first, that are nearer than [`NEAR`] in most postures.

@@ -3,9 +3,12 @@
 //! A finger ends at a moving joint below which nothing moves. Its tip link is the one whose collision geometry reaches
 //! farthest from that joint.
 
+use super::crowded::{crowded_note, crowded_pairs};
+use super::enclosing::{enclosing_links, enclosing_note};
 use super::finger_names::{End, finger_names};
 use super::rigid::rigid_links;
 use super::tip_sphere::fit_tip;
+use crate::hand::Hand;
 use crate::import::options::LoadOptions;
 use crate::import::shared_motors;
 use crate::import::spec::{FingerSpec, HandSpec, PadSpec, TipSpec};
@@ -69,6 +72,19 @@ pub(crate) fn guess_hand(robot: &Robot, options: &LoadOptions, file: &Path) -> R
     };
     shared_motors::place_held_leaders(robot, &mut spec);
     Ok(spec)
+}
+
+/// Writes into `spec` what would keep the fingers of `hand`, which was made of it, from holding anything: volumes around the fingertips, and pairs
+/// of links of one finger that are always near each other. What is said of it.
+pub(crate) fn leave_out_what_blocks(robot: &Robot, hand: &Hand, spec: &mut HandSpec) -> Vec<String> {
+    spec.without_geometry = enclosing_links(hand);
+    let mut notes: Vec<String> = spec.without_geometry.iter().map(|&link| enclosing_note(robot, link)).collect();
+    let crowded = crowded_pairs(hand);
+    if !crowded.is_empty() {
+        notes.push(crowded_note(robot, &crowded));
+        spec.allow.extend(crowded);
+    }
+    notes
 }
 
 /// The moving joints of each finger, from `base` on.

@@ -229,3 +229,26 @@ impl Relocations<'_, '_> {
         tried.known.len() - 1
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_failed_counts_for_the_grasps_that_it_is_on_the_way_to() {
+        let choice = |options: &[usize]| -> Choice { options.iter().copied().collect() };
+        // With finger 0 on its option 1, finger 2 found no path to its option 3.
+        let known = vec![(choice(&[1, 0, 0]), 2, 3, None), (choice(&[0, 0, 0]), 0, 1, Some(Vec::new()))];
+        let tried = Tried { known, lacks_forces: false };
+        for (goal, expected) in [
+            ([1, 0, 3], true),
+            ([1, 2, 3], true),
+            ([1, 0, 0], false),
+            ([1, 0, 2], false),
+            ([2, 0, 3], false),
+            ([0, 0, 3], false),
+        ] {
+            assert_eq!(tried.failed_towards(&choice(&goal)), expected, "{goal:?}");
+        }
+    }
+}

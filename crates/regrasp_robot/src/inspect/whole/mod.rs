@@ -7,9 +7,7 @@ mod text;
 /// Links that touch.
 mod touch;
 
-use super::crowded::{crowded_note, crowded_pairs};
-use super::enclosing::{enclosing_links, enclosing_note};
-use super::guess::guess_hand;
+use super::guess::{guess_hand, leave_out_what_blocks};
 use super::{InspectSettings, PairTable};
 use crate::hand::Hand;
 use crate::import::assemble::assemble;
@@ -74,14 +72,8 @@ pub fn inspect_whole(
     for spec in specs.iter_mut().flatten() {
         // With what the mount link carries rigidly, which is the arm's otherwise.
         let Ok((hand, _)) = assemble(&robot, spec, file) else { continue };
-        spec.without_geometry = enclosing_links(&hand);
-        notes.extend(spec.without_geometry.iter().map(|&link| enclosing_note(&robot, link)));
+        notes.extend(leave_out_what_blocks(&robot, &hand, spec));
         leave_geometry_out(&mut cleared, spec.without_geometry.iter().copied());
-        let crowded = crowded_pairs(&hand);
-        if !crowded.is_empty() {
-            notes.push(crowded_note(&robot, &crowded));
-            spec.allow.extend(crowded);
-        }
     }
     let robot = Arc::new(cleared);
     let make = |guess: &HandGuess, spec: Result<HandSpec, InputError>| {

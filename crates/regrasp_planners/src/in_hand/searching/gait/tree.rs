@@ -260,8 +260,7 @@ fn detour(
     regrasp_over(&mut search.workspace, state, &options, &goal, &mut table, DETOUR_RELOCATIONS, &mut rng)
 }
 
-/// Nodes from which on extensions make detours: easy queries are solved by then. By measurement, 18 seeds with 400,000 configurations each:
-/// allegro/cylinder20_x is solved 9 times with detours and 3 times without, LEAP's cube 11 times and 15 times.
+/// Nodes from which on extensions make detours: easy queries are solved by then. By hand. What detours bring is in docs/benchmarks/hands.md.
 const DETOUR_NODES: u64 = 30;
 /// Third contacts per finger. By hand.
 const DETOUR_CONTACTS: usize = 4;
