@@ -22,9 +22,7 @@ from regrasp.simulate.model import REFERENCE_REACH, REFERENCE_STIFFNESS, contact
 from regrasp.simulate.model import normals_in_world  # noqa: E402
 from regrasp.simulate.plans import flat  # noqa: E402
 from regrasp.simulate.reference import reference, rotation_matrices, waypoints_of  # noqa: E402
-
-#: Of replays: docs/benchmarks/tracking_replay.json.
-SETTINGS: dict[str, Any] = json.loads((REPOSITORY / "docs/benchmarks/tracking_replay.json").read_text())
+from regrasp.simulate.torsion import spinning  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +35,7 @@ def football(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[dict[st
     path: Path = tmp_path_factory.mktemp("scenes") / "football.toml"
     path.write_text(text.replace(goal, "rotation_vector = [0.5, 0.7, 0.52]"))
     scene = regrasp.load_scene(path)
-    plan = regrasp.plan(scene, seed=1, settings=SETTINGS)
+    plan = regrasp.plan(scene, seed=1)
     assert isinstance(plan, regrasp.Plan), plan
     yield flat(json.loads(plan.to_json())), regrasp.export_mjcf(plan, scene)
 
@@ -82,6 +80,24 @@ def test_planned_sliding_adds_up_to_the_way_of_the_plan(football: tuple[dict[str
         np.testing.assert_allclose(velocity.sum(axis=0) * ref.tick, way, atol=1e-12)
         longest = max(longest, float(np.linalg.norm(way)))
     assert longest > 1e-3
+
+
+def test_creep_of_spinning_tips_is_undone_where_they_slide(football: tuple[dict[str, Any], str]) -> None:
+    plan, xml = football
+    rig = make_rig(xml, plan, Settings())
+    crept = np.linalg.norm(spinning(rig, contact_jacobians(rig)[1]).slips, axis=2)
+    undone = grown = first = 0
+    for segment in plan["segments"]:
+        last = first + len(segment["waypoints"]) - 1
+        for f, contact in enumerate(segment["waypoints"][0]["contacts"]):
+            change = crept[last, f] - crept[first, f]
+            if contact["mode"] == "sliding":
+                assert change <= 0.0
+                undone += change < 0.0
+            else:
+                grown += change > 0.0
+        first = last + 1
+    assert undone > 0 and grown > 0
 
 
 def test_a_short_tracking_plan_is_kept_and_slides_as_planned(football: tuple[dict[str, Any], str]) -> None:

@@ -69,15 +69,16 @@ fn in_hand_scenes(real_hands: bool) -> Result<Vec<PathBuf>, String> {
     Ok(found)
 }
 
-/// Plans of tracking: as Cherif 1999 has them; with exact cones, a friction margin and normal forces from 0.5 to 20 N; of the wide hand
-/// with gaits; of six fingers. Some half an hour.
+/// Plans of tracking: football and diamond with the defaults; the football as Cherif 1999 has it; the wide hand with gaits; six fingers.
+/// Some hour.
 pub fn tracking(_: &[String]) -> Outcome {
     needs_python()?;
     let seeds = number("TRACKING_SEEDS", 20)?;
     let folder = out("replay-tracking")?;
     let runs = [
-        ("paper", "football", "B,H", "", "tracking_paper"),
-        ("football", "football", "B,C2,H", "tracking_replay", "tracking"),
+        ("paper", "football", "B,H", "tracking_paper", "tracking_paper"),
+        ("football", "football", "B,H", "", "tracking"),
+        ("diamond", "diamond", "B,H", "", "tracking_diamond"),
         ("gaiting", "tracking_sphere_wide", "B,C2,H", "gaiting_replay", "gaiting"),
         ("six", "tracking_sphere_six", "B,C2,H", "six_replay", "tracking_six"),
     ];

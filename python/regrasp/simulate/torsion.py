@@ -12,18 +12,22 @@ nothing spins, and is zero at landing.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._mujoco import mujoco
 from .model import Rig, normals_in_world
-from .reference import Array, held_at_waypoints, rotation_matrices, waypoints_of
+from .reference import Array, Plan, held_at_waypoints, rotation_matrices, waypoints_of
 
 #: Angle of spin at which the moment of a contact is full, in radians. By hand: about as much as a fingertip's joints give.
 BREAKAWAY = 0.01
 #: Share of its normal force that a contact has left for moments at least, however large its tangential force. By hand.
 LEAST_ROOM = 0.3
+#: A tip that slides goes back to its planned place on the object by this share of its planned way at most: friction still points as
+#: planned. By hand.
+RETURN_SHARE = 0.5
 
 
 def spins(rig: Rig) -> Array:
@@ -77,7 +81,8 @@ class Spinning:
     forces: Array
     """Added to the planned contact forces, they keep the object in balance; in the world. Shape (n_waypoints, n_fingers, 3)."""
     slips: Array
-    """How far the tip has slid over the object since it landed, in the world. Shape (n_waypoints, n_fingers, 3)."""
+    """How far the tip has crept over the object beside what is planned, in the world: from zero at landing. Where the tip slides as
+    planned, it goes back to its planned place. Shape (n_waypoints, n_fingers, 3)."""
 
 
 def friction_of(rig: Rig) -> tuple[Array, Array]:
@@ -136,9 +141,29 @@ def spinning(rig: Rig, contacts: Array, told: float | None = None) -> Spinning:
     rate = torsion * slippery**2 / np.maximum(left, 1e-9)
     step = (np.abs(spun) * share**2 * rate)[:, :, None] * across
     slips = np.zeros(step.shape)
+    back = RETURN_SHARE * _planned_slides(rig.plan)
     for k in range(1, len(points)):
-        slips[k] = np.where(held[k][:, None], slips[k - 1] + step[k], 0.0)
+        left_over = np.linalg.norm(slips[k - 1], axis=1)
+        share_left = np.maximum(0.0, 1.0 - back[k] / np.maximum(left_over, 1e-12))
+        went = np.where((back[k] > 0.0)[:, None], slips[k - 1] * share_left[:, None], slips[k - 1] + step[k])
+        slips[k] = np.where(held[k][:, None], went, 0.0)
     return Spinning(moments, added, slips)
+
+
+def _planned_slides(plan: Plan) -> Array:
+    """How far each tip slides over the object as planned, from the waypoint before to each one, in metres; zero where it does not,
+    and between two segments, where everything rests. Shape (n_waypoints, n_fingers)."""
+    rows: list[list[float]] = []
+    for segment in plan["segments"]:
+        before = segment["waypoints"][0]["time"]
+        for point in segment["waypoints"]:
+            seconds, before = point["time"] - before, point["time"]
+            rows.append([_sliding_speed(contact) * seconds for contact in point["contacts"]])
+    return np.array(rows)
+
+
+def _sliding_speed(contact: dict[str, Any]) -> float:
+    return float(np.linalg.norm(contact["relative_velocity_in_object"])) if contact["mode"] == "sliding" else 0.0
 
 
 def least_forces(arms: Array, force: Array, torque: Array) -> Array:

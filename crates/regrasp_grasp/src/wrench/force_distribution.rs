@@ -158,6 +158,14 @@ pub fn distribute(problem: &ForceProblem, warm: Option<&[ContactForce]>) -> Resu
     if has_torsion(problem) { distribute_in::<4>(problem, warm) } else { distribute_in::<3>(problem, warm) }
 }
 
+/// As [`distribute`], for callers who do not ask why there are none: that takes most of its time where there are none.
+pub fn distribute_if_any(problem: &ForceProblem, warm: Option<&[ContactForce]>) -> Option<BalancedForces> {
+    match has_torsion(problem) {
+        true => least_effort::<4>(problem, warm).ok(),
+        false => least_effort::<3>(problem, warm).ok(),
+    }
+}
+
 /// True when [`distribute`] finds forces; takes a fraction of its time.
 pub fn can_balance(problem: &ForceProblem) -> bool {
     fn inside<const D: usize>(problem: &ForceProblem) -> bool {
@@ -175,11 +183,21 @@ fn distribute_in<const D: usize>(
     problem: &ForceProblem,
     warm: Option<&[ContactForce]>,
 ) -> Result<BalancedForces, NoForces> {
+    least_effort::<D>(problem, warm).map_err(|infeasible| match infeasible {
+        Some(infeasible) => cause::<D>(problem, &infeasible),
+        None => NoForces::NotBalanced,
+    })
+}
+
+/// The forces. Errors: there are none; which limits stand in the way, where forces without any limits balance.
+fn least_effort<const D: usize>(
+    problem: &ForceProblem,
+    warm: Option<&[ContactForce]>,
+) -> Result<BalancedForces, Option<Infeasible>> {
     let start = warm.filter(|warm| warm.len() == problem.grips.len()).map(|warm| {
         warm.iter().enumerate().map(|(index, exerted)| coordinates::<D>(problem, index, exerted)).collect()
     });
-    let solved = program::<D>(problem, Relaxed::default()).ok_or(NoForces::NotBalanced)?.minimum(start);
-    let forces = solved.map_err(|infeasible| cause::<D>(problem, &infeasible))?;
+    let forces = program::<D>(problem, Relaxed::default()).ok_or(None)?.minimum(start).map_err(Some)?;
     Ok(forces.iter().enumerate().map(|(index, f)| combined(&axes_at::<D>(problem, index), f)).collect())
 }
 

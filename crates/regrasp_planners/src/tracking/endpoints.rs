@@ -84,7 +84,7 @@ pub fn start(stepper: &Stepper, query: &TrackingQuery, seed: u64) -> Result<(Tra
     refuse_hand_inside(model, pose)?;
     let invalid = |message: String, advice: &str| Failure::bare(FailureKind::StartInvalid, message, advice);
     let Some(state) = given_grasp_at(model, End::Start, pose, &query.start_grasp, Near::Rest)? else {
-        return choose_start(stepper, pose, seed).ok_or_else(|| {
+        return choose_start(stepper, pose, seed, 0).ok_or_else(|| {
             let message = "no grasp was found at the start that closes and whose forces balance the weight".to_owned();
             invalid(message, "move the start to where the fingers reach, or give [start] grasp = { contacts = ... }")
         });

@@ -6,7 +6,7 @@
 //! - pyramids of four sides inscribed in the cones: the linear program of eq. (13). Of all forces those of least power
 //!   `P = -q' . (f_ext + G f')`, with `f'` the tangential parts (minimum power principle, Peshkin and Sanderson 1989); what is
 //!   then left open goes to small forces. They lie at corners of what is allowed, and jump from corner to corner;
-//! - the exact cones: forces well inside, those of `regrasp_grasp::wrench::distribute`, which changes little where contacts
+//! - the exact cones: forces well inside, those of `regrasp_grasp::wrench::distribute_if_any`, which changes little where contacts
 //!   change little. Least power is a wish beside its own for small forces across the normal and for the normal force of the settings: together
 //!   they ask for `|f_t|^2 + POWER P`.
 
@@ -14,7 +14,7 @@ use crate::tracking::settings::Cones;
 use arrayvec::ArrayVec;
 use regrasp_geometry::{Point, UnitVector, Vector, frame};
 use regrasp_grasp::wrench::linear_program::{LinearProgram, MAX_ROWS, NoSolution};
-use regrasp_grasp::wrench::{ForceLimits, ForceProblem, Rubbing, Wrench, distribute};
+use regrasp_grasp::wrench::{ForceLimits, ForceProblem, Rubbing, Wrench, distribute_if_any};
 use regrasp_grasp::{Contact, ContactForce, ContactModel, GraspFrame, Grip};
 use regrasp_manipulation::grasp::state::MAX_FINGERS;
 
@@ -104,7 +104,7 @@ fn in_cones(contacts: &[Pressing], load: &Load, near: Option<&Forces>) -> Result
     };
     let exerted = |force: &Vector| ContactForce { force: *force, torsion: 0.0 };
     let near: Option<ArrayVec<ContactForce, MAX_FINGERS>> = near.map(|forces| forces.iter().map(exerted).collect());
-    let found = distribute(&problem, near.as_deref()).map_err(|_| NotBalanced)?;
+    let found = distribute_if_any(&problem, near.as_deref()).ok_or(NotBalanced)?;
     Ok(found.iter().map(|exerted| exerted.force).collect())
 }
 

@@ -46,10 +46,11 @@ use regrasp_plan::Plan;
 use regrasp_plan::plan::{PoseData, Statistics};
 use regrasp_scene::{GraspRequest, HandView, TrackingQuery};
 use search::{Counts, Ended, search};
+use start_grasp::choose_start;
 use step::Stepper;
 
 /// Searches that are begun before none is begun any more. By hand.
-const MOST_RESTARTS: u64 = 40;
+const MOST_RESTARTS: u64 = 200;
 /// Fingers that rest where fewer may.
 const FEWEST_RESTING: usize = 2;
 
@@ -96,7 +97,7 @@ fn plan_in_hand_frame(
         workspace: Workspace::new(&model),
         work: 0,
     };
-    let first = endpoints::start(&stepper, query, seed)?;
+    let mut starts = vec![endpoints::start(&stepper, query, seed)?];
     let goal = query.world_from_object_goal.rotation;
     let is_start_chosen = query.start_grasp == GraspRequest::Automatic;
     let may_rest_fewer = settings.fewer_rest && settings.resting_fingers > FEWEST_RESTING && model.n_fingers() == 4;
@@ -104,9 +105,12 @@ fn plan_in_hand_frame(
     let mut nearest: Option<(f64, TrackingGrasp)> = None;
     loop {
         let mut rng = Rng::keyed(seed, "tracking", counts.restarts);
-        let with_three = counts.restarts % 4 == if is_start_chosen { 3 } else { 0 };
-        let with_fewer = may_rest_fewer && !with_three;
+        let with_fewer = may_rest_fewer && counts.restarts % 4 != 3;
         stepper.resting = if with_fewer { FEWEST_RESTING } else { settings.resting_fingers };
+        if is_start_chosen && counts.restarts > 0 && starts.len() < settings.start_grasps {
+            starts.extend(choose_start(&stepper, &query.world_from_object_start, seed, counts.restarts));
+        }
+        let first = &starts[counts.restarts as usize % starts.len()];
         let found = search(&mut stepper, &first.0, &goal, &mut rng, budget, &mut counts, progress);
         let (index, angle_left) = found.nearest;
         let before = nearest.as_ref().map_or(f64::INFINITY, |(angle_left, _)| *angle_left);
@@ -118,7 +122,7 @@ fn plan_in_hand_frame(
                 let path = found.path_to(last);
                 counts.on_path = path.len() as u64 - 1;
                 let moves: Vec<&Move> = path.iter().flat_map(|&node| &found.nodes[node].moves).collect();
-                return Ok(record::record(&stepper, query, seed, &first, &moves, statistics(&counts)));
+                return Ok(record::record(&stepper, query, seed, first, &moves, statistics(&counts)));
             }
             Err(Ended::Exhausted) if counts.restarts < MOST_RESTARTS => counts.restarts += 1,
             Err(ended) => return Err(failure(&ended, &counts, nearest)),

@@ -31,10 +31,10 @@ const TURNED: f64 = 0.9;
 const MOST_RESTING: usize = 3;
 
 /// A grasp of all fingers with the object at `pose`, clear, closed and with forces that balance the weight: of some drawn by `seed`
-/// the one from which the object turns most freely, whatever the direction.
-pub fn choose_start(stepper: &Stepper, pose: &Pose, seed: u64) -> Option<(TrackingGrasp, Forces)> {
+/// the one from which the object turns most freely, whatever the direction. Another `attempt` draws others.
+pub fn choose_start(stepper: &Stepper, pose: &Pose, seed: u64, attempt: u64) -> Option<(TrackingGrasp, Forces)> {
     let model = stepper.model;
-    let mut rng = Rng::keyed(seed, "tracking_start", 0);
+    let mut rng = Rng::keyed(seed, "tracking_start", attempt);
     let of_fingers: Vec<Vec<Contact>> =
         (0..model.n_fingers()).map(|finger| draw_contacts(stepper, pose, finger, &mut rng)).collect();
     if of_fingers.iter().any(Vec::is_empty) {

@@ -15,6 +15,11 @@ use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{LoadedScene, TrackingQuery, load_scene};
 use std::collections::BTreeSet;
 
+/// Three fingers rest, as in Cherif 1999: with two the sphere needs no gaits.
+fn three_rest(method: TrackingMethod) -> TrackingSettings {
+    TrackingSettings { method, fewer_rest: false, ..TrackingSettings::default() }.with_forces_of_cherif_1999()
+}
+
 fn plan_with(
     loaded: &LoadedScene,
     query: &TrackingQuery,
@@ -22,8 +27,7 @@ fn plan_with(
     seed: u64,
     work: u64,
 ) -> Result<Plan, Failure> {
-    let settings = TrackingSettings { method, ..TrackingSettings::default() };
-    plan_tracking(&loaded.view(), query, &settings, seed, &Budget::work(work), &|_| {})
+    plan_tracking(&loaded.view(), query, &three_rest(method), seed, &Budget::work(work), &|_| {})
 }
 
 /// Queries with other goals: 8 degrees about each axis, either way.
@@ -70,8 +74,7 @@ fn a_sphere_turns_about_the_contact_of_the_rolling_finger() {
     let loaded = scene("tracking_sphere_wide.toml");
     let mut n_solved = 0;
     for query in small_turns(&loaded) {
-        let settings = TrackingSettings { fewer_rest: false, ..TrackingSettings::default() };
-        let planned = plan_tracking(&loaded.view(), &query, &settings, 0, &Budget::work(300_000), &|_| {});
+        let planned = plan_with(&loaded, &query, TrackingMethod::Tracking, 0, 300_000);
         let Ok(plan) = planned else { continue };
         n_solved += 1;
         assert_eq!((plan.method.as_str(), plan.statistics.relocations), ("tracking", 0));
