@@ -103,12 +103,14 @@ fn work_counts_draws_of_contacts_that_do_not_fit() {
     loaded.scene.objects[0] = thin_object();
     let query = loaded.in_hand(0);
     let settings = InHandSettings { n_threads: 1, ..InHandSettings::default() };
-    let started = std::time::Instant::now();
     let max_work = 2_000;
     let found = plan_in_hand(&loaded.view(), &query, &settings, 0, &Budget::work(max_work), &|_| {});
-    let work = found.map_or_else(|failure| failure.statistics.work, |plan| plan.statistics.work);
+    let statistics = found.map_or_else(|failure| failure.statistics, |plan| plan.statistics);
+    let work = statistics.work;
     assert!(work < 2 * max_work, "{work} units of {max_work}");
-    assert!(started.elapsed().as_secs_f64() < 2.0, "{work} units took {:?}", started.elapsed());
+    // One place at which a finger finds no contact costs hundreds of draws.
+    let n_vain = statistics.failures.get("no_contact").copied().unwrap_or(0);
+    assert!(n_vain > 0 && work >= 100 * n_vain, "{work} units for {n_vain} places without a contact");
 }
 
 /// A flat, finely corrugated plate: every ball of a fingertip's size slides from groove to groove.
