@@ -258,6 +258,7 @@ fn the_gait_tells_sliding_from_rolling_and_marks_who_moves_and_who_is_rolled_on(
 #[test]
 fn all_fingers_that_move_are_marked() {
     let mut plan = football().plan.clone();
+    plan.segments.iter_mut().for_each(|segment| segment.also_moving.clear());
     let strips = |plan: &Plan| charts::gait(plan).matches("class=\"moving\"").count();
     let before = (strips(&plan), timeline::roles(&plan));
     for segment in &mut plan.segments {
