@@ -145,8 +145,10 @@ def spinning(rig: Rig, contacts: Array, told: float | None = None) -> Spinning:
     for k in range(1, len(points)):
         left_over = np.linalg.norm(slips[k - 1], axis=1)
         share_left = np.maximum(0.0, 1.0 - back[k] / np.maximum(left_over, 1e-12))
-        went = np.where((back[k] > 0.0)[:, None], slips[k - 1] * share_left[:, None], slips[k - 1] + step[k])
-        slips[k] = np.where(held[k][:, None], went, 0.0)
+        slips[k] = slips[k - 1] + step[k]
+        returns = back[k] > 0.0
+        slips[k][returns] = slips[k - 1][returns] * share_left[returns][:, None]
+        slips[k][~held[k]] = 0.0
     return Spinning(moments, added, slips)
 
 
