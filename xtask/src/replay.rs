@@ -70,7 +70,7 @@ fn in_hand_scenes(real_hands: bool) -> Result<Vec<PathBuf>, String> {
 }
 
 /// Plans of tracking: football and diamond with the defaults; the football as Cherif 1999 has it; the wide hand with gaits; six fingers.
-/// Some hour.
+/// An hour or more.
 pub fn tracking(_: &[String]) -> Outcome {
     needs_python()?;
     let seeds = number("TRACKING_SEEDS", 20)?;

@@ -158,7 +158,8 @@ pub fn distribute(problem: &ForceProblem, warm: Option<&[ContactForce]>) -> Resu
     if has_torsion(problem) { distribute_in::<4>(problem, warm) } else { distribute_in::<3>(problem, warm) }
 }
 
-/// As [`distribute`], for callers who do not ask why there are none: that takes most of its time where there are none.
+/// The forces of [`distribute`], for callers who do not ask why there are none: that answer takes up to three more searches for forces,
+/// with limits left out. Panics as [`distribute`].
 pub fn distribute_if_any(problem: &ForceProblem, warm: Option<&[ContactForce]>) -> Option<BalancedForces> {
     match has_torsion(problem) {
         true => least_effort::<4>(problem, warm).ok(),
@@ -189,7 +190,7 @@ fn distribute_in<const D: usize>(
     })
 }
 
-/// The forces. Errors: there are none; which limits stand in the way, where forces without any limits balance.
+/// The forces of [`distribute`]. Errors: none exist; with the limits that stand most in the way, if forces without limits would balance.
 fn least_effort<const D: usize>(
     problem: &ForceProblem,
     warm: Option<&[ContactForce]>,

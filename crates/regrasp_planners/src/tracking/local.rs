@@ -36,12 +36,12 @@ const KEPT: f64 = 0.05;
 
 /// Distance from home, in units of the object's size, from which a finger is rolled back, where one finger moves at a time. By hand.
 const FAR: f64 = 0.06;
-/// To where it is rolled back then. By hand.
+/// Distance from home to which it is rolled back then. By hand.
 const NEAR: f64 = 0.04;
 /// As [`FAR`], where several fingers move at a time. By measurement: with 0.06 and 0.04 plans of the football take 366 seconds on the mean,
-/// with these 280, and as many are solved. Where one finger moves, scenario D-3 of Cherif 1999 is not solved with these.
+/// with 0.2 and 0.05 they take 280, and as many are solved. Where one finger moves, scenario D-3 of Cherif 1999 is not solved with these.
 const FAR_OF_SEVERAL: f64 = 0.2;
-/// See [`FAR_OF_SEVERAL`].
+/// As [`NEAR`], where several fingers move at a time.
 const NEAR_OF_SEVERAL: f64 = 0.05;
 /// Distance from home, in the same unit, at which a finger is back on its first contact, where ranges are asked for. By hand.
 const BACK: f64 = 0.01;

@@ -2,8 +2,8 @@
 //! *Global Planning for Dexterous Re-orientation of Rigid Objects: Finger Tracking with Rolling and Sliding*, INRIA RR-3770,
 //! 1999.
 //!
-//! At every instant three fingertips rest and the others move: one of four; of three fingertips two rest, of others if the
-//! settings say so. On one of those that rest the object rolls without sliding; over the others it rolls and slides. Where that
+//! At every instant some fingertips rest and the others move. Of three or four fingertips two rest, of more three; the settings can ask
+//! for three of four, as in Cherif 1999, sec. 3.1. On one of those that rest the object rolls without sliding; over the others it rolls and slides. Where that
 //! gets no farther a finger may be relocated through the air: `gaiting`.
 
 /// Start and hand as the query gives them.
@@ -53,6 +53,8 @@ use step::Stepper;
 const MOST_RESTARTS: u64 = 200;
 /// Fingers that rest where fewer may.
 const FEWEST_RESTING: usize = 2;
+/// Of so many searches in a row the last rests as many fingers as the settings say, where fewer may rest. By hand.
+const SEARCHES_IN_A_ROUND: u64 = 4;
 
 /// Plans how the fingertips turn the object to the goal's orientation.
 ///
@@ -105,7 +107,8 @@ fn plan_in_hand_frame(
     let mut nearest: Option<(f64, TrackingGrasp)> = None;
     loop {
         let mut rng = Rng::keyed(seed, "tracking", counts.restarts);
-        let with_fewer = may_rest_fewer && counts.restarts % 4 != 3;
+        let is_last_of_round = (counts.restarts + 1) % SEARCHES_IN_A_ROUND == 0;
+        let with_fewer = may_rest_fewer && !is_last_of_round;
         stepper.resting = if with_fewer { FEWEST_RESTING } else { settings.resting_fingers };
         if is_start_chosen && counts.restarts > 0 && starts.len() < settings.start_grasps {
             starts.extend(choose_start(&stepper, &query.world_from_object_start, seed, counts.restarts));

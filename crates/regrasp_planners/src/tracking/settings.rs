@@ -90,7 +90,7 @@ pub struct TrackingSettings {
     pub resting_fingers: usize,
     /// Whether with four fingers two may rest in place of three: in three of four searches, also in the first. Cherif 1999 always rests
     /// three. By measurement, random turns by 60 degrees from start grasps of the planner's choice, football: 25 of 25 with two, 3 of 15
-    /// with three. In simulation more plans are kept with two (docs/benchmarks/tracking.md).
+    /// with three. In simulation plans with two end nearer to the goal (docs/benchmarks/tracking.md).
     pub fewer_rest: bool,
     /// Start grasps of the planner's choice: a search that is begun anew begins from another one, until there are so many. With 1 the
     /// first is kept.
@@ -167,22 +167,24 @@ impl Default for TrackingSettings {
             goal_weight: 1.2,
             nodes: 2000,
             patience: 3,
-            in_hand: in_hand(1.3, [0.5, 20.0]),
+            in_hand: with_forces(InHandSettings::default(), 1.3, [0.5, 20.0]),
         }
     }
 }
 
-fn in_hand(friction_margin: f64, normal_force: [f64; 2]) -> InHandSettings {
-    let forces = Some(ForceSettings { normal_force, ..ForceSettings::default() });
-    let physics = PhysicsSettings { friction_margin, forces, ..PhysicsSettings::default() };
-    InHandSettings { physics, ..InHandSettings::default() }
+/// `settings` with another friction margin and other limits of the normal forces.
+fn with_forces(mut settings: InHandSettings, friction_margin: f64, normal_force: [f64; 2]) -> InHandSettings {
+    let forces = settings.physics.forces.unwrap_or_default();
+    settings.physics.friction_margin = friction_margin;
+    settings.physics.forces = Some(ForceSettings { normal_force, ..forces });
+    settings
 }
 
 impl TrackingSettings {
-    /// Forces of Cherif 1999, sec. 6.2.3: in pyramids, of least power, without a margin, of fingertips that may touch without
-    /// pressing. The largest normal force is ours; Cherif 1999 has none.
+    /// These settings with the forces of Cherif 1999, sec. 6.2.3: in pyramids, of least power, without a margin, of fingertips that may
+    /// touch without pressing. The largest normal force is ours; Cherif 1999 has none.
     pub fn with_forces_of_cherif_1999(self) -> Self {
-        TrackingSettings { cones: Cones::Pyramid, in_hand: in_hand(1.0, [0.0, 80.0]), ..self }
+        TrackingSettings { cones: Cones::Pyramid, in_hand: with_forces(self.in_hand, 1.0, [0.0, 80.0]), ..self }
     }
 
     /// The choices of Cherif 1999, as far as they are settings: its forces, three fingers that rest, roles at random, local plans of at most
@@ -260,6 +262,12 @@ mod tests {
         let in_hand = InHandSettings { physics, ..whole.in_hand.clone() };
         assert_eq!(some, TrackingSettings { in_hand, ..whole });
         assert_eq!(read(r#"{"in_hand": {"forces": null}}"#).unwrap().in_hand.physics.forces, None);
+    }
+
+    #[test]
+    fn the_file_of_the_papers_choices_has_them() {
+        let file = include_str!("../../../../docs/benchmarks/tracking_paper.json");
+        assert_eq!(read(file).unwrap(), TrackingSettings::of_cherif_1999());
     }
 
     #[test]

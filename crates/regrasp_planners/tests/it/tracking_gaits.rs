@@ -15,7 +15,7 @@ use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_scene::{LoadedScene, TrackingQuery, load_scene};
 use std::collections::BTreeSet;
 
-/// Three fingers rest, as in Cherif 1999: with two the sphere needs no gaits.
+/// Three fingers rest, with the forces of Cherif 1999. With the defaults the sphere needs no gaits, and these tests are about gaits.
 fn three_rest(method: TrackingMethod) -> TrackingSettings {
     TrackingSettings { method, fewer_rest: false, ..TrackingSettings::default() }.with_forces_of_cherif_1999()
 }
@@ -129,6 +129,20 @@ fn sliding_and_moving(plan: &Plan) -> BTreeSet<(usize, usize)> {
         (n_sliding, 1 + segment.also_moving.len())
     });
     counts.collect()
+}
+
+/// Two fingers rest by default, and forces keep a margin.
+#[test]
+fn with_the_defaults_tracking_alone_turns_the_sphere_of_the_wide_hand() {
+    let loaded = scene("tracking_sphere_wide.toml");
+    for seed in 0..3 {
+        let query = loaded.tracking(seed);
+        let settings = TrackingSettings::default();
+        let plan = plan_tracking(&loaded.view(), &query, &settings, seed, &Budget::work(2_000_000), &|_| {})
+            .unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+        accepted(&loaded, &query, &plan);
+        assert_eq!((plan.method.as_str(), plan.statistics.relocations), ("tracking", 0));
+    }
 }
 
 /// Where two fingers rest one slides, and the others stick.

@@ -76,6 +76,28 @@ fn a_turn_beyond_reach_takes_fingertips_over_edges() {
     }
 }
 
+/// A search that is begun anew begins from another start grasp, unless the settings keep the first.
+#[test]
+fn other_start_grasps_help_where_the_first_does_not() {
+    let loaded = scene("diamond_any_start.toml");
+    let query = loaded.tracking(3);
+    let of_first = |settings: &TrackingSettings| {
+        let mut still = query.clone();
+        still.world_from_object_goal = still.world_from_object_start;
+        planned(&loaded, &still, settings, 3).unwrap().segments[0].waypoints[0].joints.clone()
+    };
+    let one = TrackingSettings { start_grasps: 1, ..TrackingSettings::default() };
+    let several = TrackingSettings::default();
+    let budget = Budget::work(WORK / 10);
+    let failure = plan_tracking(&loaded.view(), &query, &one, 3, &budget, &|_| {}).unwrap_err();
+    assert!(failure.statistics.restarts > 0, "{failure}");
+    let plan = planned(&loaded, &query, &several, 3).unwrap_or_else(|failure| panic!("{failure}"));
+    assert!(plan.statistics.restarts > 0 && plan.statistics.work < WORK / 10);
+    assert_eq!(of_first(&one), of_first(&several));
+    assert_ne!(plan.segments[0].waypoints[0].joints, of_first(&several));
+    assert!(TrackingSettings { start_grasps: 0, ..several }.validate().unwrap_err().contains("start_grasps"));
+}
+
 /// Fingers that also move while the object does.
 fn also_moving(plan: &Plan) -> usize {
     let slides = |segment: &&Segment| segment.waypoints[0].contacts.iter().any(|c| c.mode == ContactMode::Sliding);
