@@ -1,7 +1,7 @@
 //! Settings of finger tracking. Lengths in metres, angles in radians, velocities per second.
 
 use crate::settings::InHandSettings;
-use regrasp_manipulation::settings::{ForceSettings, PhysicsSettings};
+use regrasp_manipulation::settings::ForceSettings;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
@@ -245,6 +245,7 @@ impl TrackingSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use regrasp_manipulation::settings::PhysicsSettings;
 
     fn read(text: &str) -> Result<TrackingSettings, String> {
         serde_json::from_str(text).map_err(|error| error.to_string())
