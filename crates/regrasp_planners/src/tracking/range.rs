@@ -23,15 +23,13 @@ const SINGULAR: f64 = 1e-3;
 const MOST_STEPS: usize = 12;
 /// Distance that it leaves, in metres.
 const REACHED: f64 = 1e-11;
-/// A tip's normal may differ from the face's by this much on a face: rounding. Balls touch edges with normals in between.
-const ON_FACE: f64 = 1e-9;
+/// Nearer to a crease than this, in metres, a ball touches the crease and no face: rounding.
+const ON_CREASE: f64 = 1e-9;
 
-/// True where a ball keeps its face: on smooth surfaces always.
+/// True where a ball keeps its face: on smooth surfaces always. A face of a mesh ends at creases, not at the edges of its triangles:
+/// where the corners of a face are rounded, its triangles are not quite in one plane.
 pub fn stays_on_its_face(surface: &Surface, from: &Touch, to: &Touch) -> bool {
-    let has_creases = surface.crease_distance(&to.foot).is_finite();
-    !has_creases
-        || ((to.ball.normal - to.foot.normal_in_object.into_inner()).norm() < ON_FACE
-            && surface.same_face(&from.foot, &to.foot))
+    surface.crease_distance(&to.foot) > ON_CREASE && surface.same_face(&from.foot, &to.foot)
 }
 
 /// A fingertip that rests.

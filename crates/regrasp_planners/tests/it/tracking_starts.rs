@@ -1,16 +1,19 @@
 //! Finger tracking from start grasps of the planner's choice: random goals, edges that have to be crossed, and Cherif 1999's own choices.
 
 use crate::in_hand_methods::scene;
+use crate::places::repository;
 use crate::queries::Queries;
 use nalgebra::UnitQuaternion;
 use regrasp_base::{Budget, Rng};
-use regrasp_geometry::Vector;
+use regrasp_geometry::{Point, Vector};
 use regrasp_plan::Plan;
 use regrasp_plan::check::CheckSettings;
 use regrasp_plan::plan::{ContactMode, Segment};
-use regrasp_planners::{Failure, TrackingSettings, plan_tracking};
-use regrasp_scene::{LoadedScene, TrackingQuery};
+use regrasp_planners::{Failure, FailureKind, TrackingSettings, plan_tracking};
+use regrasp_robot::LoadOptions;
+use regrasp_scene::{LoadedScene, TrackingQuery, load_scene};
 use std::collections::BTreeSet;
+use std::fmt::Write;
 
 /// Work for one plan.
 const WORK: u64 = 4_000_000;
@@ -172,4 +175,70 @@ fn ranges_are_refused_where_fewer_than_three_fingers_rest() {
     let query = loaded.tracking(0);
     let failure = plan_tracking(&loaded.view(), &query, &ranges, 0, &Budget::work(1000), &|_| {}).unwrap_err();
     assert!(failure.message.contains("range_coverage") && failure.statistics.work == 0, "{failure}");
+}
+
+/// A regular dodecahedron whose corners are rounded to `digits` decimals, as a file of the kind obj. Its faces are three triangles each,
+/// which then lie not quite in one plane, and here and there fold inwards.
+fn rounded_dodecahedron(digits: usize) -> String {
+    let golden = (1.0 + 5.0f64.sqrt()) / 2.0;
+    let signs = [-1.0, 1.0];
+    let mut corners: Vec<Point> = Vec::new();
+    for (a, b) in signs.into_iter().flat_map(|a| signs.map(|b| (a, b))) {
+        corners.extend(signs.map(|c| Point::new(a, b, c)));
+        let rim = Vector::new(0.0, a / golden, b * golden);
+        corners.extend([rim, Vector::new(rim.y, rim.z, rim.x), Vector::new(rim.z, rim.x, rim.y)].map(Point::from));
+    }
+    corners.iter_mut().for_each(|corner| *corner *= 0.055);
+    let mut text = String::new();
+    for p in &corners {
+        writeln!(text, "v {:.digits$} {:.digits$} {:.digits$}", p.x, p.y, p.z).unwrap();
+    }
+    // Faces look where the corners of an icosahedron are.
+    for (a, b) in signs.into_iter().flat_map(|a| signs.map(|b| (a, b))) {
+        let axis = Vector::new(0.0, a * golden, b);
+        for axis in [axis, Vector::new(axis.y, axis.z, axis.x), Vector::new(axis.z, axis.x, axis.y)] {
+            let far = corners.iter().map(|p| p.coords.dot(&axis)).fold(0.0, f64::max);
+            let mut face: Vec<usize> = (0..corners.len()).filter(|&i| corners[i].coords.dot(&axis) > far - 1e-6).collect();
+            let x = corners[face[0]].coords - axis * (far / axis.norm_squared());
+            let y = axis.cross(&x) / axis.norm();
+            let angle = |i: usize| corners[i].coords.dot(&y).atan2(corners[i].coords.dot(&x));
+            face.sort_by(|&i, &j| angle(i).total_cmp(&angle(j)));
+            for i in 1..face.len() - 1 {
+                writeln!(text, "f {} {} {}", face[0] + 1, face[i] + 1, face[i + 1] + 1).unwrap();
+            }
+        }
+    }
+    text
+}
+
+/// As meshes come: written with nine decimals, with six as most exporters write, and with dents of 0.03 mm.
+#[test]
+fn faces_of_several_triangles_with_rounded_corners_are_faces() {
+    let folder = std::env::temp_dir().join(format!("regrasp-rounded-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let bundled = repository().join("scenes/diamond_any_start.toml");
+    let text = std::fs::read_to_string(bundled).unwrap();
+    let hands = format!("{}/assets/hands", repository().display());
+    let mesh = text.lines().find(|line| line.starts_with("mesh = ")).unwrap();
+    let text = text.replace("../assets/hands", &hands).replace(mesh, "mesh = { file = \"solid.obj\" }");
+    std::fs::write(folder.join("scene.toml"), text).unwrap();
+    for digits in [9, 6, 4] {
+        std::fs::write(folder.join("solid.obj"), rounded_dodecahedron(digits)).unwrap();
+        let loaded = load_scene(&folder.join("scene.toml"), &LoadOptions::default()).unwrap();
+        for seed in [0, 1] {
+            let query = turned(&loaded, seed, 1.0);
+            planned(&loaded, &query, &TrackingSettings::default(), seed)
+                .unwrap_or_else(|failure| panic!("{digits} decimals, seed {seed}: {failure}"));
+        }
+    }
+    // A corner that is pushed in by more than that is a dent.
+    let text = rounded_dodecahedron(9).replacen("v -0.055000000 -0.055000000 -0.055000000", "v -0.05 -0.05 -0.05", 1);
+    std::fs::write(folder.join("solid.obj"), text).unwrap();
+    let loaded = load_scene(&folder.join("scene.toml"), &LoadOptions::default()).unwrap();
+    let Err(failure) = planned(&loaded, &loaded.tracking(0), &TrackingSettings::default(), 0) else {
+        panic!("the dent was not seen");
+    };
+    assert_eq!(failure.kind, FailureKind::Impossible, "{failure}");
+    assert!(failure.to_string().contains("not convex: it has a dent of"), "{failure}");
+    std::fs::remove_dir_all(&folder).unwrap();
 }
