@@ -198,7 +198,8 @@ fn rounded_dodecahedron(digits: usize) -> String {
         let axis = Vector::new(0.0, a * golden, b);
         for axis in [axis, Vector::new(axis.y, axis.z, axis.x), Vector::new(axis.z, axis.x, axis.y)] {
             let far = corners.iter().map(|p| p.coords.dot(&axis)).fold(0.0, f64::max);
-            let mut face: Vec<usize> = (0..corners.len()).filter(|&i| corners[i].coords.dot(&axis) > far - 1e-6).collect();
+            let mut face: Vec<usize> =
+                (0..corners.len()).filter(|&i| corners[i].coords.dot(&axis) > far - 1e-6).collect();
             let x = corners[face[0]].coords - axis * (far / axis.norm_squared());
             let y = axis.cross(&x) / axis.norm();
             let angle = |i: usize| corners[i].coords.dot(&y).atan2(corners[i].coords.dot(&x));
