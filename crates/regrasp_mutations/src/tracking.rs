@@ -216,13 +216,16 @@ impl Breeder<'_> {
             (!may_move(model, &plan.segments[s], f)).then_some(())
         });
         self.add("finger that also moves not named", &[WrongMovingFinger], |plan, rng| {
-            let (s, w, f) = pick_moving(plan, model, rng, |_| true)?;
+            let several: Vec<usize> =
+                (0..plan.segments.len()).filter(|&s| !plan.segments[s].also_moving.is_empty()).collect();
+            let s = *several.get(rng.below(several.len().max(1)))?;
             let segment = &mut plan.segments[s];
-            let moved = |k: usize| (segment.waypoints[w].joints[k] - segment.waypoints[0].joints[k]).abs() > 1e-6;
-            let moves = model.fingers[f].coordinates.clone().any(moved);
-            let named = segment.also_moving.iter().position(|name| *name == model.fingers[f].name)?;
-            segment.also_moving.remove(named);
-            moves.then_some(())
+            let name = segment.also_moving.remove(rng.below(segment.also_moving.len()));
+            let finger = model.fingers.iter().find(|finger| finger.name == name)?;
+            let start = &segment.waypoints[0].joints;
+            let moved =
+                |k: usize| segment.waypoints.iter().any(|waypoint| (waypoint.joints[k] - start[k]).abs() > 1e-6);
+            finger.coordinates.clone().any(moved).then_some(())
         });
         self.add("finger named twice as moving", &[WrongMovingFinger], |plan, rng| {
             let segment = any_segment(plan, rng, SegmentKind::Tracking)?;

@@ -5,6 +5,8 @@
 //! barrier, 11.4 phase I). The barrier's weight is fixed: its minimum is unique, lies strictly inside all limits, and
 //! depends analytically on the data.
 
+/// That no forces balance, shown by a direction.
+mod certificate;
 /// One Newton step.
 mod newton_step;
 
@@ -81,6 +83,15 @@ pub struct Infeasible {
     pub joint: Option<(usize, usize)>,
 }
 
+/// What is wanted where there are no forces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// Which limits stand most in the way: phase I is brought to its end.
+    Explained,
+    /// Nothing: phase I ends as soon as a direction shows it. The limits that are told mean nothing.
+    Bare,
+}
+
 /// Weight of the barrier in squares of the squeeze: forces then keep some hundredths of a newton inside limits that bind.
 const BARRIER: f64 = 1e-3;
 /// Square of the Newton decrement below which the next step is the last: the error left is of its square.
@@ -113,21 +124,27 @@ impl<const D: usize> Program<D> {
     }
 
     /// The minimum. `warm` may be any forces; those near the minimum save time.
-    pub fn minimum(&self, warm: Option<Forces<D>>) -> Result<Forces<D>, Infeasible> {
+    pub fn minimum(&self, warm: Option<Forces<D>>, refusal: Refusal) -> Result<Forces<D>, Infeasible> {
         if let Some(start) = warm.and_then(|warm| self.balanced(warm))
             && let Some(found) = self.center(start)
         {
             return Ok(found);
         }
-        let start = self.strictly_inside()?;
+        let start = self.strictly_inside(refusal)?;
         let undecided = self.infeasible(&start);
         self.center(start).ok_or(undecided)
     }
 
     /// Balanced forces inside all limits by more than the band.
-    pub fn strictly_inside(&self) -> Result<Forces<D>, Infeasible> {
+    pub fn strictly_inside(&self, refusal: Refusal) -> Result<Forces<D>, Infeasible> {
         let start = self.without_limits();
-        if self.slack(&start) > self.band() { Ok(start) } else { self.phase_one(start) }
+        if self.slack(&start) > self.band() { Ok(start) } else { self.phase_one(start, refusal) }
+    }
+
+    /// The same; `warm` may be any forces, and those inside save time.
+    pub fn strictly_inside_near(&self, warm: Option<Forces<D>>) -> Option<Forces<D>> {
+        let start = warm.and_then(|warm| self.balanced(warm)).filter(|start| self.slack(start) > self.band());
+        start.or_else(|| self.strictly_inside(Refusal::Bare).ok())
     }
 
     /// The minimum without any limits but balance.
@@ -220,7 +237,7 @@ impl<const D: usize> Program<D> {
     }
 
     /// Phase I: gives way at all limits alike, as little as can be.
-    fn phase_one(&self, mut forces: Forces<D>) -> Result<Forces<D>, Infeasible> {
+    fn phase_one(&self, mut forces: Forces<D>, refusal: Refusal) -> Result<Forces<D>, Infeasible> {
         let mut give = -self.slack(&forces) + 0.25 * self.squeeze;
         let degree: f64 = self.blocks.iter().map(|block| 4.0 + 2.0 * block.rows.len() as f64).sum();
         let mut weight = degree / give;
@@ -229,11 +246,14 @@ impl<const D: usize> Program<D> {
             point.at(self, &forces, give, 0.0);
             let rest = self.rest(&forces);
             // The bordered system of forces and give: 10.4.2 again.
-            let (straight, _) = point.step.solve(&point.descent, &rest);
-            let (across, _) = point.step.solve(&point.mixed, &[0.0; 6]);
+            let (straight, _, dual) = point.step.solve_both(&point.descent, &rest);
+            let (across, _, dual_across) = point.step.solve_both(&point.mixed, &[0.0; 6]);
             let slope = point.give_slope - weight;
             let curvature = point.give_curvature - dot(&point.mixed, &across);
             let by = (slope - dot(&point.mixed, &straight)) / curvature;
+            if refusal == Refusal::Bare && self.is_refused_by(&std::array::from_fn(|k| dual[k] - by * dual_across[k])) {
+                return Err(self.infeasible(&forces));
+            }
             let step = moved(&straight, &across, -by);
             let decrement = dot(&point.descent, &step) + slope * by;
             if !(decrement > NEARLY_CENTERED) {

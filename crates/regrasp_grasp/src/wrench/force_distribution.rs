@@ -13,7 +13,7 @@
 //!
 //! Joint torques carry the contact forces only: fingers whose own weight counts need that on top.
 
-use super::barrier::{Block, Infeasible, Program};
+use super::barrier::{Block, Forces, Infeasible, Program, Refusal};
 pub use super::barrier::{MAX_GRIPS, MAX_ROWS};
 use crate::closure::GraspFrame;
 use crate::contact::{ContactForce, ContactModel, Grip};
@@ -158,19 +158,30 @@ pub fn distribute(problem: &ForceProblem, warm: Option<&[ContactForce]>) -> Resu
     if has_torsion(problem) { distribute_in::<4>(problem, warm) } else { distribute_in::<3>(problem, warm) }
 }
 
-/// The forces of [`distribute`], for callers who do not ask why there are none: that answer takes up to three more searches for forces,
+/// The forces of [`distribute`], for callers who do not ask why there are none: that answer takes a longer search, and up to three more
 /// with limits left out. Panics as [`distribute`].
 pub fn distribute_if_any(problem: &ForceProblem, warm: Option<&[ContactForce]>) -> Option<BalancedForces> {
     match has_torsion(problem) {
-        true => least_effort::<4>(problem, warm).ok(),
-        false => least_effort::<3>(problem, warm).ok(),
+        true => least_effort::<4>(problem, warm, Refusal::Bare).ok(),
+        false => least_effort::<3>(problem, warm, Refusal::Bare).ok(),
     }
+}
+
+/// Some balanced forces inside all limits where [`distribute`] finds its own, in half of its time; of `warm` it takes what is near. Panics as
+/// [`distribute`].
+pub fn any_inside(problem: &ForceProblem, warm: Option<&[ContactForce]>) -> Option<BalancedForces> {
+    fn inside<const D: usize>(problem: &ForceProblem, warm: Option<&[ContactForce]>) -> Option<BalancedForces> {
+        let program = program::<D>(problem, Relaxed::default())?;
+        let forces = program.strictly_inside_near(starting_at::<D>(problem, warm))?;
+        Some(all_exerted(problem, &forces))
+    }
+    if has_torsion(problem) { inside::<4>(problem, warm) } else { inside::<3>(problem, warm) }
 }
 
 /// True when [`distribute`] finds forces; takes a fraction of its time.
 pub fn can_balance(problem: &ForceProblem) -> bool {
     fn inside<const D: usize>(problem: &ForceProblem) -> bool {
-        program::<D>(problem, Relaxed::default()).is_some_and(|program| program.strictly_inside().is_ok())
+        program::<D>(problem, Relaxed::default()).is_some_and(|program| program.strictly_inside(Refusal::Bare).is_ok())
     }
     if has_torsion(problem) { inside::<4>(problem) } else { inside::<3>(problem) }
 }
@@ -184,7 +195,7 @@ fn distribute_in<const D: usize>(
     problem: &ForceProblem,
     warm: Option<&[ContactForce]>,
 ) -> Result<BalancedForces, NoForces> {
-    least_effort::<D>(problem, warm).map_err(|infeasible| match infeasible {
+    least_effort::<D>(problem, warm, Refusal::Explained).map_err(|infeasible| match infeasible {
         Some(infeasible) => cause::<D>(problem, &infeasible),
         None => NoForces::NotBalanced,
     })
@@ -194,18 +205,27 @@ fn distribute_in<const D: usize>(
 fn least_effort<const D: usize>(
     problem: &ForceProblem,
     warm: Option<&[ContactForce]>,
+    refusal: Refusal,
 ) -> Result<BalancedForces, Option<Infeasible>> {
-    let start = warm.filter(|warm| warm.len() == problem.grips.len()).map(|warm| {
-        warm.iter().enumerate().map(|(index, exerted)| coordinates::<D>(problem, index, exerted)).collect()
-    });
-    let forces = program::<D>(problem, Relaxed::default()).ok_or(None)?.minimum(start).map_err(Some)?;
-    Ok(forces.iter().enumerate().map(|(index, f)| combined(&axes_at::<D>(problem, index), f)).collect())
+    let program = program::<D>(problem, Relaxed::default()).ok_or(None)?;
+    let forces = program.minimum(starting_at::<D>(problem, warm), refusal).map_err(Some)?;
+    Ok(all_exerted(problem, &forces))
+}
+
+/// Coordinates of forces to start from.
+fn starting_at<const D: usize>(problem: &ForceProblem, warm: Option<&[ContactForce]>) -> Option<Forces<D>> {
+    warm.filter(|warm| warm.len() == problem.grips.len())
+        .map(|warm| warm.iter().enumerate().map(|(index, exerted)| coordinates::<D>(problem, index, exerted)).collect())
+}
+
+fn all_exerted<const D: usize>(problem: &ForceProblem, forces: &Forces<D>) -> BalancedForces {
+    forces.iter().enumerate().map(|(index, f)| combined(&axes_at::<D>(problem, index), f)).collect()
 }
 
 /// Which limit would have to give: the kind whose absence leaves forces, weakest first.
 fn cause<const D: usize>(problem: &ForceProblem, infeasible: &Infeasible) -> NoForces {
     let without = |relaxed: Relaxed| match program::<D>(problem, relaxed) {
-        Some(program) => program.strictly_inside().err(),
+        Some(program) => program.strictly_inside(Refusal::Explained).err(),
         None => Some(*infeasible),
     };
     let Some(no_joints) = without(Relaxed { joints: true, ..Relaxed::default() }) else {

@@ -10,6 +10,6 @@ pub mod force_distribution;
 pub mod linear_program;
 /// Newton steps, contact by contact.
 pub use force_distribution::{
-    BalancedForces, ForceLimits, ForceProblem, JointRow, JointRows, NoForces, Reserve, Rubbing, Wrench, can_balance,
-    distribute, distribute_if_any,
+    BalancedForces, ForceLimits, ForceProblem, JointRow, JointRows, NoForces, Reserve, Rubbing, Wrench, any_inside,
+    can_balance, distribute, distribute_if_any,
 };

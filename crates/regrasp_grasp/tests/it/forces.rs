@@ -6,7 +6,9 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 use regrasp_base::Rng;
 use regrasp_geometry::{Point, UnitVector, Vector};
 use regrasp_grasp::wrench::any_direction::{answer, reserves};
-use regrasp_grasp::wrench::{BalancedForces, JointRow, JointRows, Reserve, Rubbing, can_balance, distribute};
+use regrasp_grasp::wrench::{
+    BalancedForces, JointRow, JointRows, Reserve, Rubbing, any_inside, can_balance, distribute,
+};
 use regrasp_grasp::{
     Contact, ContactForce, ContactModel, ForceLimits, ForceProblem, GraspFrame, Grip, NoForces, Wrench,
 };
@@ -186,6 +188,13 @@ fn agrees_with_another_solver() {
         let problem = problem(&grips, &joints, weight(&mut rng));
         let ours = distribute(&problem, None);
         assert_eq!(can_balance(&problem), ours.is_ok());
+        // Some forces are there where the best are, from any start.
+        let cold = any_inside(&problem, None);
+        assert_eq!(cold.is_some(), ours.is_ok());
+        for found in [&cold, &any_inside(&problem, cold.as_deref()), &any_inside(&problem, ours.as_deref().ok())] {
+            assert_eq!(found.is_some(), ours.is_ok());
+            found.iter().for_each(|forces| assert_good(&problem, forces));
+        }
         if let Ok(forces) = &ours {
             assert_good(&problem, forces);
         }
@@ -229,6 +238,7 @@ fn contacts_that_slide_agree_with_another_solver() {
         let problem = ForceProblem { rubbing: &rubbing, ..problem(&grips, &[], weight(&mut rng)) };
         let ours = distribute(&problem, None);
         assert_eq!(can_balance(&problem), ours.is_ok());
+        assert_eq!(any_inside(&problem, None).is_some(), ours.is_ok());
         let (theirs, give) = by_clarabel(&problem);
         if give.abs() < 2e-3 {
             n_band += 1;

@@ -1,6 +1,6 @@
 //! What is wrong with a tracking query is said before any search.
 
-use crate::tracking::forces::Forces;
+use crate::tracking::forces::{Choice, Forces};
 use crate::tracking::grasp::TrackingGrasp;
 use crate::tracking::range::RESTING;
 use crate::tracking::settings::TrackingSettings;
@@ -100,7 +100,7 @@ pub fn start(stepper: &Stepper, query: &TrackingQuery, seed: u64) -> Result<(Tra
     }
     let grasp = TrackingGrasp::of(model, &state)
         .ok_or_else(|| invalid("a fingertip's centre is inside the object at the start".into(), "move it out"))?;
-    let Ok(forces) = stepper.balanced_at_rest(&grasp) else {
+    let Ok(forces) = stepper.balanced_at_rest(&grasp, Choice::Best) else {
         let [least, largest] =
             stepper.settings.in_hand.physics.forces.map_or([0.0, f64::MAX], |forces| forces.normal_force);
         let message = format!(

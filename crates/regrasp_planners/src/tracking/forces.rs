@@ -14,7 +14,7 @@ use crate::tracking::settings::Cones;
 use arrayvec::ArrayVec;
 use regrasp_geometry::{Point, UnitVector, Vector, frame};
 use regrasp_grasp::wrench::linear_program::{LinearProgram, MAX_ROWS, NoSolution};
-use regrasp_grasp::wrench::{ForceLimits, ForceProblem, Rubbing, Wrench, distribute_if_any};
+use regrasp_grasp::wrench::{ForceLimits, ForceProblem, Rubbing, Wrench, any_inside, distribute_if_any};
 use regrasp_grasp::{Contact, ContactForce, ContactModel, GraspFrame, Grip};
 use regrasp_manipulation::grasp::state::MAX_FINGERS;
 
@@ -64,17 +64,31 @@ pub struct NotBalanced;
 /// Forces on the object, in the object frame, one per fingertip.
 pub type Forces = ArrayVec<Vector, MAX_FINGERS>;
 
+/// Which of the forces that balance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Choice {
+    /// The best.
+    Best,
+    /// In exact cones any that are inside the limits, in half of the time: a search asks only whether there are any. In pyramids the best.
+    Any,
+}
+
 /// Forces that balance the load; `near` may be those of a moment close by.
 ///
 /// Errors: there are none; in exact cones, none that keep some distance from every limit.
-pub fn balance(contacts: &[Pressing], load: &Load, near: Option<&Forces>) -> Result<Forces, NotBalanced> {
+pub fn balance(
+    contacts: &[Pressing],
+    load: &Load,
+    near: Option<&Forces>,
+    choice: Choice,
+) -> Result<Forces, NotBalanced> {
     match load.cones {
         Cones::Pyramid => in_pyramids(contacts, load).map_err(|_| NotBalanced),
-        Cones::Exact => in_cones(contacts, load, near),
+        Cones::Exact => in_cones(contacts, load, near, choice),
     }
 }
 
-fn in_cones(contacts: &[Pressing], load: &Load, near: Option<&Forces>) -> Result<Forces, NotBalanced> {
+fn in_cones(contacts: &[Pressing], load: &Load, near: Option<&Forces>, choice: Choice) -> Result<Forces, NotBalanced> {
     let grip = |contact: &Pressing| Grip {
         contact: Contact {
             point_in_object: contact.point,
@@ -104,7 +118,11 @@ fn in_cones(contacts: &[Pressing], load: &Load, near: Option<&Forces>) -> Result
     };
     let exerted = |force: &Vector| ContactForce { force: *force, torsion: 0.0 };
     let near: Option<ArrayVec<ContactForce, MAX_FINGERS>> = near.map(|forces| forces.iter().map(exerted).collect());
-    let found = distribute_if_any(&problem, near.as_deref()).ok_or(NotBalanced)?;
+    let found = match choice {
+        Choice::Best => distribute_if_any(&problem, near.as_deref()),
+        Choice::Any => any_inside(&problem, near.as_deref()),
+    };
+    let found = found.ok_or(NotBalanced)?;
     Ok(found.iter().map(|exerted| exerted.force).collect())
 }
 
@@ -234,7 +252,7 @@ mod tests {
             let mut n_balanced = 0;
             for _ in 0..2000 {
                 let contacts = contacts(&mut rng);
-                let Ok(forces) = balance(&contacts, &load, None) else { continue };
+                let Ok(forces) = balance(&contacts, &load, None, Choice::Best) else { continue };
                 n_balanced += 1;
                 let (mut sum, mut moment) = (load.weight, Vector::zeros());
                 for (contact, force) in contacts.iter().zip(&forces) {
@@ -250,7 +268,7 @@ mod tests {
                 }
                 assert!(sum.norm() < 1e-9 && moment.norm() < 1e-10, "{sum:?} {moment:?}");
                 let near: Forces = forces.iter().map(|force| force * 1.01).collect();
-                let again = balance(&contacts, &load, Some(&near)).unwrap();
+                let again = balance(&contacts, &load, Some(&near), Choice::Best).unwrap();
                 let apart = again.iter().zip(&forces).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
                 assert!(apart < 1e-6, "where the search for forces begins does not matter: {apart}");
             }
@@ -268,11 +286,11 @@ mod tests {
         let (mut n_both, mut n_lost) = (0, 0);
         for _ in 0..3000 {
             let contacts = contacts(&mut rng);
-            let exact = balance(&contacts, &EXACT, None).is_ok();
-            if balance(&contacts, &with_room, None).is_ok() {
+            let exact = balance(&contacts, &EXACT, None, Choice::Best).is_ok();
+            if balance(&contacts, &with_room, None, Choice::Best).is_ok() {
                 assert!(exact, "forces in the pyramids, but none in the cones");
                 n_both += 1;
-            } else if exact && balance(&contacts, &LOAD, None).is_err() {
+            } else if exact && balance(&contacts, &LOAD, None, Choice::Best).is_err() {
                 n_lost += 1;
             }
         }
@@ -289,7 +307,9 @@ mod tests {
             let contacts = contacts(&mut rng);
             let still: Vec<Pressing> =
                 contacts.iter().map(|contact| Pressing { object_velocity: Vector::zeros(), ..*contact }).collect();
-            let (Ok(wished), Ok(without)) = (balance(&contacts, &EXACT, None), balance(&still, &EXACT, None)) else {
+            let (Ok(wished), Ok(without)) =
+                (balance(&contacts, &EXACT, None, Choice::Best), balance(&still, &EXACT, None, Choice::Best))
+            else {
                 continue;
             };
             let power = |forces: &Forces| -> f64 {

@@ -5,6 +5,7 @@
 //! the others closed and their forces within their cones. Which finger lands where is found by looking ahead: of some
 //! footholds of every finger that may leave, that one is taken from which tracking leads farthest towards the goal.
 
+use crate::tracking::forces::Choice;
 use crate::tracking::grasp::{TrackingGrasp, turn_to};
 use crate::tracking::local::Local;
 use crate::tracking::step::{Stepper, TrackingStep};
@@ -130,7 +131,8 @@ fn options(local: &mut Local, from: &TrackingGrasp) -> Vec<Change> {
             state.set_contact(finger, Some(contact));
             state.joints[finger] = joints;
             let Some(grasp) = TrackingGrasp::of(model, &state) else { continue };
-            if is_near(stepper, &grasp.tip_in_world(model, finger), finger) && stepper.balanced_at_rest(&grasp).is_ok()
+            if is_near(stepper, &grasp.tip_in_world(model, finger), finger)
+                && stepper.balanced_at_rest(&grasp, Choice::Any).is_ok()
             {
                 options.push(Change { finger, grasp, steps: Vec::new(), worth: 0.0 });
             }

@@ -120,6 +120,18 @@ struct Choice {
     controls: Controls,
     /// Turn of the object in a step, in the world; none where it rests.
     turn: Option<Vector>,
+    /// How long the step takes.
+    seconds: f64,
+}
+
+impl Choice {
+    /// The same in half of the time, or in the time of the shortest step.
+    fn shorter(mut self, shortest: f64) -> Self {
+        let seconds = (0.5 * self.seconds).max(shortest);
+        let share = seconds / self.seconds;
+        self.controls.iter_mut().flatten().for_each(|control| *control *= share);
+        Choice { turn: self.turn.map(|turn| turn * share), seconds, ..self }
+    }
 }
 
 /// What a local plan has come to.
@@ -154,7 +166,8 @@ impl Local<'_, '_, '_> {
         before: Option<Roles>,
     ) -> LocalPlan {
         let settings = self.stepper.settings;
-        let most_steps = (settings.local_time * settings.sub_goal_time / settings.time_step).round() as usize;
+        let most_seconds = settings.local_time * settings.sub_goal_time;
+        let mut seconds = 0.0;
         let mut steps: Vec<TrackingStep> = Vec::new();
         let mut here = start.clone();
         self.stepper.workspace.set(&here.world_from_object.to_pose(), &here.joints, &here.contacts());
@@ -165,12 +178,13 @@ impl Local<'_, '_, '_> {
             self.failures[OUTSIDE_RANGES] += 1;
             return LocalPlan { steps: Vec::new(), arrived: false };
         }
-        let mut n_restored = steps.len();
         let mut choice = before.map(|roles| {
             let way = |_| Some(Vector::zeros());
-            Choice { roles, controls: self.controls_home(&here, roles.moving, way, settings.time_step), turn: None }
+            let controls = self.controls_home(&here, roles.moving, way, settings.longest_step);
+            Choice { roles, controls, turn: None, seconds: settings.longest_step }
         });
-        while steps.len() - n_restored < most_steps {
+        // The last step may end beyond by what sums of tenths are off.
+        while seconds < most_seconds - 1e-6 {
             let left = turn_to(&here.orientation(), goal);
             if left.norm() <= tolerance {
                 return LocalPlan { steps, arrived: true };
@@ -189,9 +203,9 @@ impl Local<'_, '_, '_> {
                     self.failures[NoStep::Degenerate.number()] += 1;
                     continue;
                 };
+                let (next, result) = self.step(&here, next);
                 choice = Some(next);
-                let Choice { roles, controls: rolled, turn } = next;
-                match self.stepper.step(&here, &Asked { roles, turn, rolled, seconds: settings.time_step }) {
+                match result {
                     Ok(step) => {
                         made = Some(step);
                         break;
@@ -204,18 +218,28 @@ impl Local<'_, '_, '_> {
             }
             let Some(step) = made else {
                 // Where the range ends another one is begun.
-                let n_before = steps.len();
                 if tried.has_no_range() && self.enter_range(&mut here, &mut steps, goal) {
-                    n_restored += steps.len() - n_before;
                     continue;
                 }
                 break;
             };
+            seconds += step.seconds;
             here = step.end.clone();
             steps.push(step);
         }
         let arrived = turn_to(&here.orientation(), goal).norm() <= tolerance;
         LocalPlan { steps, arrived }
+    }
+
+    /// The step of this choice, halved as long as it is too long; and the choice of which it is.
+    fn step(&mut self, here: &TrackingGrasp, mut choice: Choice) -> (Choice, Result<TrackingStep, NoStep>) {
+        loop {
+            let Choice { roles, controls: rolled, turn, seconds } = choice;
+            match self.stepper.step(here, &Asked { roles, turn, rolled, seconds }) {
+                Err(NoStep::TooLong) => choice = choice.shorter(self.stepper.settings.time_step),
+                result => return (choice, result),
+            }
+        }
     }
 
     /// True where some range has the turn to `goal`, if need be after the fingertips have gone back to their first contacts: the
@@ -324,34 +348,34 @@ impl Local<'_, '_, '_> {
     fn keep(&self, here: &TrackingGrasp, choice: &Choice, left: &Vector) -> Option<Choice> {
         let Roles { moving, .. } = choice.roles;
         let least = if each(moving).any(|finger| self.rolls_by_itself(finger)) { WELL_ALIGNED } else { STILL_ALIGNED };
-        let prospect = self.prospect(here, choice.roles, left).filter(|prospect| prospect.cosine >= least)?;
+        let seconds = choice.seconds;
+        let prospect = self.prospect(here, choice.roles, left, seconds).filter(|prospect| prospect.cosine >= least)?;
         let way = |finger| Some(prospect.tip_way(self.stepper.model, here, finger));
-        let controls = self.controls_home(here, moving, way, self.time_step());
+        let controls = self.controls_home(here, moving, way, seconds);
         Some(Choice { turn: Some(prospect.turn), controls, ..*choice })
     }
 
-    /// What these roles promise where `left` is the turn left to the sub-goal.
+    /// What these roles promise in a step of `seconds` where `left` is the turn left to the sub-goal.
     ///
     /// The contacts leave one turn, which Cherif 1999 takes at the extreme velocity of the largest component wanted. Here it goes no
     /// farther than to where it is nearest to the sub-goal.
-    fn prospect(&self, here: &TrackingGrasp, roles: Roles, left: &Vector) -> Option<Prospect> {
+    fn prospect(&self, here: &TrackingGrasp, roles: Roles, left: &Vector, seconds: f64) -> Option<Prospect> {
         let model = self.stepper.model;
         let resting: PerFinger<usize> = each(model.all_fingers() & !roles.moving).collect();
         let motion = ObjectMotion::new(model, here, &resting, roles.rolling, left)?;
         let (shift, allowed) = motion.twist(left);
         let cosine = allowed.dot(left) / (allowed.norm() * left.norm());
-        let settings = self.stepper.settings;
-        let most = settings.object_velocity * settings.time_step / allowed.amax();
+        let most = self.stepper.settings.object_velocity * seconds / allowed.amax();
         let share = (allowed.dot(left) / allowed.norm_squared()).min(most);
         let (shift, allowed) = (shift * share, allowed * share);
         Some(Prospect { cosine, shift, turn: allowed })
     }
 
-    /// How far along its reach a tip is that goes on like this for [`AHEAD`]: 1 at the end; 0 where reach has no end.
+    /// How far along its reach a tip is that goes on for [`AHEAD`] as in a step of the longest time: 1 at the end; 0 where reach has no end.
     fn reach_share(&self, here: &TrackingGrasp, finger: usize, tip_way: &Vector) -> f64 {
         let model = self.stepper.model;
         let Some(reach) = model.view.reach else { return 0.0 };
-        let tip = here.tip_in_world(model, finger) + tip_way * (AHEAD / self.stepper.settings.time_step);
+        let tip = here.tip_in_world(model, finger) + tip_way * (AHEAD / self.stepper.settings.longest_step);
         (tip - model.fingers[finger].tip_at_rest).norm() / reach
     }
 
@@ -369,6 +393,7 @@ impl Local<'_, '_, '_> {
         }
         let model = self.stepper.model;
         let n = model.n_fingers();
+        let seconds = self.stepper.settings.longest_step;
         let has_failed = tried.n > 0;
         let chance = if has_failed { 1.0 } else { CHANCE };
         let is_random = self.stepper.settings.roles == RoleChoice::Random;
@@ -384,7 +409,7 @@ impl Local<'_, '_, '_> {
                 continue;
             }
             let noise = self.rng.uniform(0.0, chance);
-            let Some(prospect) = self.prospect(here, roles, left).filter(|p| p.cosine >= least_aligned) else {
+            let Some(prospect) = self.prospect(here, roles, left, seconds).filter(|p| p.cosine >= least_aligned) else {
                 continue;
             };
             if is_random {
@@ -426,17 +451,13 @@ impl Local<'_, '_, '_> {
             None => return None,
         };
         let controls = match has_failed {
-            true => self.drawn_controls(roles.moving),
+            true => self.drawn_controls(roles.moving, seconds),
             false => {
                 let way = |finger| moves.as_ref().map(|prospect| prospect.tip_way(model, here, finger));
-                self.controls_home(here, roles.moving, way, self.time_step())
+                self.controls_home(here, roles.moving, way, seconds)
             }
         };
-        Some(Choice { roles, controls, turn: moves.map(|prospect| prospect.turn) })
-    }
-
-    fn time_step(&self) -> f64 {
-        self.stepper.settings.time_step
+        Some(Choice { roles, controls, turn: moves.map(|prospect| prospect.turn), seconds })
     }
 
     /// The controls of moving fingers for a step of `seconds` that lead them home; `tip_way` is the way of a finger's tip in the
@@ -467,7 +488,7 @@ impl Local<'_, '_, '_> {
         // Where the object rests, only this step is sure to be rolled so; else others like it follow.
         let mut n_steps = 1.0;
         if let Some(tip_way) = tip_way {
-            n_steps = AHEAD / settings.time_step;
+            n_steps = AHEAD / seconds;
             if matches!(self.homes, Homes::InWorld(_)) {
                 home -= here.world_from_object.vector_to_child(tip_way) * n_steps;
             }
@@ -480,9 +501,9 @@ impl Local<'_, '_, '_> {
         controls.min_by(|a, b| left(a).total_cmp(&left(b))).unwrap_or([0.0; 2])
     }
 
-    /// Controls of moving fingers, drawn from the extremes (Cherif 1999, eq. 10).
-    fn drawn_controls(&mut self, moving: Fingers) -> Controls {
-        let most = self.stepper.settings.rolling_velocity * self.time_step();
+    /// Controls of moving fingers for a step of `seconds`, drawn from the extremes (Cherif 1999, eq. 10).
+    fn drawn_controls(&mut self, moving: Fingers, seconds: f64) -> Controls {
+        let most = self.stepper.settings.rolling_velocity * seconds;
         let mut controls = Controls::default();
         for finger in each(moving) {
             controls[finger] = std::array::from_fn(|_| most * (self.rng.below(3) as f64 - 1.0));

@@ -90,15 +90,7 @@ fn plan_in_hand_frame(
     refuse_fingers_that_cannot_follow(&model)?;
     endpoints::refuse(&model, &view.gravity)?;
     endpoints::refuse_ranges_of_few(&model, settings)?;
-    let forces = model.forces.as_ref().expect("settings without forces do not validate");
-    let mut stepper = Stepper {
-        model: &model,
-        settings,
-        resting: settings.resting_fingers,
-        forces,
-        workspace: Workspace::new(&model),
-        work: 0,
-    };
+    let mut stepper = Stepper::new(&model, settings);
     let mut starts = vec![endpoints::start(&stepper, query, seed)?];
     let goal = query.world_from_object_goal.rotation;
     let is_start_chosen = query.start_grasp == GraspRequest::Automatic;

@@ -29,7 +29,12 @@ const ON_CREASE: f64 = 1e-9;
 /// True where a ball keeps its face: on smooth surfaces always. A face of a mesh ends at creases, not at the edges of its triangles:
 /// where the corners of a face are rounded, its triangles are not quite in one plane.
 pub fn stays_on_its_face(surface: &Surface, from: &Touch, to: &Touch) -> bool {
-    surface.crease_distance(&to.foot) > ON_CREASE && surface.same_face(&from.foot, &to.foot)
+    !lies_on_crease(surface, to) && surface.same_face(&from.foot, &to.foot)
+}
+
+/// True where a ball touches an edge or a vertex.
+pub fn lies_on_crease(surface: &Surface, touch: &Touch) -> bool {
+    surface.crease_distance(&touch.foot) <= ON_CREASE
 }
 
 /// A fingertip that rests.

@@ -142,12 +142,15 @@ fn segment(stepper: &Stepper, stretch: &Stretch) -> Segment {
 fn tracked(stepper: &Stepper, start: &TrackingGrasp, steps: &[&TrackingStep]) -> Segment {
     let mut here = start;
     let mut waypoints = Vec::with_capacity(1 + steps.len());
-    for step in steps {
-        waypoints.push(waypoint(stepper, here, &step.relative, &step.forces[0]));
+    for (index, step) in steps.iter().enumerate() {
+        let forces = stepper.best_forces_at_start(here, step);
+        waypoints.push(waypoint(stepper, here, &step.relative, &forces));
+        if index + 1 == steps.len() {
+            let forces = stepper.best_forces_at_end(here, step);
+            waypoints.push(waypoint(stepper, &step.end, &step.relative, &forces));
+        }
         here = &step.end;
     }
-    let last = steps[steps.len() - 1];
-    waypoints.push(waypoint(stepper, here, &last.relative, &last.forces[1]));
     tracking_segment(stepper.model, &steps[0].roles, waypoints)
 }
 

@@ -1,8 +1,8 @@
 //! A start grasp of the planner's own choice: it knows nothing of the goal.
 
-use crate::tracking::forces::Forces;
+use crate::tracking::forces::{Choice, Forces};
 use crate::tracking::grasp::TrackingGrasp;
-use crate::tracking::step::{Roles, Stepper};
+use crate::tracking::step::{Beginning, Roles, Stepper};
 use nalgebra::Rotation3;
 use regrasp_base::Rng;
 use regrasp_geometry::collision::Placement;
@@ -40,7 +40,7 @@ pub fn choose_start(stepper: &Stepper, pose: &Pose, seed: u64, attempt: u64) -> 
     if of_fingers.iter().any(Vec::is_empty) {
         return None;
     }
-    let mut best: Option<(f64, TrackingGrasp, Forces)> = None;
+    let mut best: Option<(f64, TrackingGrasp)> = None;
     let mut n_found = 0;
     for _ in 0..COMBINATIONS {
         let contacts: Contacts = of_fingers.iter().map(|contacts| contacts[rng.below(contacts.len())]).collect();
@@ -51,46 +51,49 @@ pub fn choose_start(stepper: &Stepper, pose: &Pose, seed: u64, attempt: u64) -> 
         let request = GraspRequest::Contacts(points);
         let Ok(Some(state)) = given_grasp_at(model, End::Start, pose, &request, Near::Rest) else { continue };
         let Some(grasp) = TrackingGrasp::of(model, &state) else { continue };
-        let Ok(forces) = stepper.balanced_at_rest(&grasp) else { continue };
+        if stepper.balanced_at_rest(&grasp, Choice::Any).is_err() {
+            continue;
+        }
         let worth = freedom(stepper, &grasp);
         n_found += 1;
-        if best.as_ref().is_none_or(|(most, _, _)| worth > *most) {
-            best = Some((worth, grasp, forces));
+        if best.as_ref().is_none_or(|(most, _)| worth > *most) {
+            best = Some((worth, grasp));
         }
-        if n_found == GRASPS || best.as_ref().is_some_and(|(most, _, _)| *most >= ENOUGH) {
+        if n_found == GRASPS || best.as_ref().is_some_and(|(most, _)| *most >= ENOUGH) {
             break;
         }
     }
-    best.map(|(_, grasp, forces)| (grasp, forces))
+    let (_, grasp) = best?;
+    let forces = stepper.balanced_at_rest(&grasp, Choice::Best).ok()?;
+    Some((grasp, forces))
 }
 
 /// How freely the object turns: for the direction in which it turns worst, the cosine to the nearest turn for which some roles have
 /// forces. On polyhedra the mean over some orientations about that of the start, as fingers stay on their faces; else of the start's.
 fn freedom(stepper: &Stepper, grasp: &TrackingGrasp) -> f64 {
     let surface = &stepper.model.view.object.surface;
+    // Any will do: three fingers that rest leave one turn, and its direction both ways.
+    let oblique = Vector::new(1.0, 0.9, 0.8);
+    let both_ways = |roles: Roles| [oblique, -oblique].map(|wanted| stepper.beginning(grasp, roles, &wanted));
+    let beginnings: Vec<Beginning> =
+        Roles::all(stepper.model.n_fingers(), MOST_RESTING).flat_map(both_ways).flatten().collect();
     let weight = stepper.forces.weight_in_world();
+    let freedom_under = |weight: &Vector| {
+        let held = beginnings.iter().filter(|beginning| stepper.is_held_under(weight, grasp, beginning));
+        freedom_of(&held.map(|beginning| beginning.turn.normalize()).collect::<Vec<Vector>>())
+    };
     if !surface.crease_distance(&grasp.touches[0].foot).is_finite() {
-        return freedom_under(stepper, grasp, &weight);
+        return freedom_under(&weight);
     }
     let axes = [Vector::x(), Vector::y(), Vector::z()];
     let turned =
         axes.iter().flat_map(|axis| [Rotation3::new(axis * TURNED) * weight, Rotation3::new(-axis * TURNED) * weight]);
-    let all: Vec<f64> =
-        std::iter::once(weight).chain(turned).map(|weight| freedom_under(stepper, grasp, &weight)).collect();
+    let all: Vec<f64> = std::iter::once(weight).chain(turned).map(|weight| freedom_under(&weight)).collect();
     all.iter().sum::<f64>() / all.len() as f64
 }
 
-/// As [`freedom`], of one orientation: with this weight.
-fn freedom_under(stepper: &Stepper, grasp: &TrackingGrasp, weight: &Vector) -> f64 {
-    let model = stepper.model;
-    // Any will do: three fingers that rest leave one turn, and its direction both ways.
-    let oblique = Vector::new(1.0, 0.9, 0.8);
-    let mut turns: Vec<Vector> = Vec::new();
-    for roles in Roles::all(model.n_fingers(), MOST_RESTING) {
-        for wanted in [oblique, -oblique] {
-            turns.extend(stepper.turn_under(weight, grasp, roles, &wanted).map(|turn| turn.normalize()));
-        }
-    }
+/// Of the 26 directions to the neighbours in a grid, for the worst the cosine to the nearest of these turns.
+fn freedom_of(turns: &[Vector]) -> f64 {
     let mut least = f64::INFINITY;
     for k in (0..27).filter(|k| *k != 13) {
         let direction = Vector::new(f64::from(k % 3 - 1), f64::from(k / 3 % 3 - 1), f64::from(k / 9 - 1)).normalize();

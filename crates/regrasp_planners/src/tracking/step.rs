@@ -1,10 +1,10 @@
 //! One step of time: the object moves on the fingertips that rest, one fingertip moves, and forces hold all of it (Cherif 1999,
 //! sec. 6.2.1 to 6.2.3).
 
-use crate::tracking::forces::{Forces, Load, Pressing, balance};
+use crate::tracking::forces::{Choice, Forces, Load, Pressing, balance};
 use crate::tracking::grasp::{PerFinger, TrackingGrasp};
 use crate::tracking::object_motion::ObjectMotion;
-use crate::tracking::range::stays_on_its_face;
+use crate::tracking::range::{lies_on_crease, stays_on_its_face};
 use crate::tracking::settings::TrackingSettings;
 use nalgebra::Rotation3;
 use regrasp_geometry::collision::Placement;
@@ -12,12 +12,12 @@ use regrasp_geometry::{Point, UnitVector, Vector, frame, interpolate_pose};
 use regrasp_grasp::contact::rolling::{Touch, roll_step, slip, turn_between};
 use regrasp_manipulation::forces::limits::ForceModel;
 use regrasp_manipulation::grasp::state::MAX_FINGERS;
-use regrasp_manipulation::model::Model;
+use regrasp_manipulation::model::{FingerModel, Model};
 use regrasp_manipulation::rolling::step::RollStep;
 use regrasp_manipulation::workspace::{TipMode, Workspace};
 use regrasp_plan::plan::ContactMode;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose, torques};
+use regrasp_robot::kinematics::whole_pose::{has_all_directions, joints_of_pose, largest_torques, torques};
 
 /// Corrections of a rolling step that would twist; each gains two digits.
 const UNTWISTINGS: usize = 3;
@@ -28,6 +28,10 @@ const SLOWEST: f64 = 1e-4;
 const MOST_BENT: f64 = 2e-4;
 /// Turn aside, half-way in steps, that a segment adds up: there and back it twists by twice as much, and checkers allow 2e-3.
 pub const MOST_BENT_IN_SEGMENT: f64 = 5e-4;
+
+/// Angle between the direction in which a tip slides in a long step and in its halves, above which the step is too long: halves are a
+/// quarter as far off, and checkers allow 0.02.
+const MOST_TURNED_ASIDE: f64 = 0.01;
 
 /// Work of a step, in the unit of in-hand planning: a configuration looked at. By measurement, some 50 against 2 microseconds.
 pub const STEP_WORK: u64 = 25;
@@ -101,7 +105,8 @@ pub enum NoStep {
     Degenerate,
     /// A moving finger may not change its face, and would.
     FaceChange,
-    /// In a step this long a moving finger would leave its face, or its joints would lead it aside.
+    /// In a step this long a moving finger would leave its face, or its joints would lead it aside, or one that slides would change its
+    /// direction.
     TooLong,
 }
 
@@ -147,10 +152,20 @@ pub struct TrackingStep {
     pub seconds: f64,
     /// Every fingertip against the object.
     pub relative: PerFinger<Relative>,
-    /// Contact forces at its beginning and at its end.
+    /// Contact forces at its beginning and at its end: some that balance. The plan gets the best ([`Stepper::best_forces_at_start`]).
     pub forces: [Forces; 2],
     /// The grasp at its end.
     pub end: TrackingGrasp,
+}
+
+/// How the object begins to turn, were forces no matter.
+#[derive(Debug, Clone)]
+pub struct Beginning {
+    /// Its turn in the shortest step, in the world.
+    pub turn: Vector,
+    /// The grasp then, but for the fingers that move.
+    end: TrackingGrasp,
+    relative: PerFinger<Relative>,
 }
 
 /// Makes steps.
@@ -163,6 +178,8 @@ pub struct Stepper<'m, 'a> {
     pub resting: usize,
     /// Weight, and what joints can exert.
     pub forces: &'m ForceModel,
+    /// No joint is too weak for any forces within the limits: which of them are taken does not matter to it.
+    is_always_strong: bool,
     /// Where object and fingers are: what collision tests start from.
     pub workspace: Workspace<'m>,
     /// Work so far.
@@ -170,6 +187,24 @@ pub struct Stepper<'m, 'a> {
 }
 
 impl<'m, 'a> Stepper<'m, 'a> {
+    /// Of a model with forces.
+    ///
+    /// Panics where the model has none.
+    pub fn new(model: &'m Model<'a>, settings: &'m TrackingSettings) -> Self {
+        let forces = model.forces.as_ref().expect("settings without forces do not validate");
+        let friction = model.frame.friction.max(model.view.object.friction);
+        let largest = forces.limits().largest * friction.hypot(1.0);
+        let is_strong = |(index, finger): (usize, &FingerModel)| {
+            let radius = finger.ik.center_in_body().coords.norm() + finger.tip_radius;
+            let torques: Coordinates =
+                largest_torques(finger.ik.chain(), radius).iter().map(|per_newton| per_newton * largest).collect();
+            forces.allows(index, &torques)
+        };
+        let is_always_strong = model.fingers.iter().enumerate().all(is_strong);
+        let (resting, workspace) = (settings.resting_fingers, Workspace::new(model));
+        Stepper { model, settings, resting, forces, is_always_strong, workspace, work: 0 }
+    }
+
     /// Takes the step from `grasp`, where the workspace is; the workspace is then at its end, else where it was.
     pub fn step(&mut self, grasp: &TrackingGrasp, asked: &Asked) -> Result<TrackingStep, NoStep> {
         self.work += STEP_WORK;
@@ -199,7 +234,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
             self.move_finger(finger, grasp, asked, &mut end)?;
         }
         let relative = self.relative(grasp, &end, asked)?;
-        let forces = self.balanced(grasp, &end, &relative)?;
+        let forces = self.balanced(grasp, &end, &relative, asked.seconds)?;
         self.workspace.roll_to(&end.contacts());
         if !self.workspace.step(&object.to_pose(), &end.joints, TipMode::AllHold) {
             return Err(NoStep::Collision);
@@ -258,7 +293,8 @@ impl<'m, 'a> Stepper<'m, 'a> {
             Touch::of(&model.view.object.surface, &center).ok_or(NoStep::OutOfReach)?
         };
         if !stays_on_its_face(&model.view.object.surface, start, &touch) {
-            if is_long {
+            let longest = if self.settings.face_changes { self.settings.longest_step } else { self.settings.time_step };
+            if asked.seconds > longest {
                 return Err(NoStep::TooLong);
             }
             if !self.settings.face_changes {
@@ -316,57 +352,109 @@ impl<'m, 'a> Stepper<'m, 'a> {
                 ContactMode::Fixed
             } else if finger == asked.roles.rolling {
                 ContactMode::Rolling
-            } else if slid.norm() < SLOWEST * self.settings.time_step {
+            } else if slid.norm() < SLOWEST * asked.seconds {
                 return Err(NoStep::Degenerate);
             } else {
                 ContactMode::Sliding
+            };
+            let slid = match mode {
+                ContactMode::Sliding => self.slid_by_halves(grasp, end, finger, &slid, asked)?,
+                _ => slid,
             };
             Ok(Relative { mode, slid, turned })
         };
         (0..model.n_fingers()).map(of).collect()
     }
 
-    /// Forces at both ends of a step, with the sliding of the step.
+    /// How far the tip of a finger that rests slides in the two halves of a step, of which the whole says `slid`.
+    ///
+    /// Errors: the step is longer than the shortest, and the two say different directions.
+    fn slid_by_halves(
+        &self,
+        grasp: &TrackingGrasp,
+        end: &TrackingGrasp,
+        finger: usize,
+        slid: &Vector,
+        asked: &Asked,
+    ) -> Result<Vector, NoStep> {
+        if asked.seconds <= self.settings.time_step {
+            return Ok(*slid);
+        }
+        // Halves tell nothing of a tip that comes down from an edge.
+        if lies_on_crease(&self.model.view.object.surface, &grasp.touches[finger]) {
+            return Err(NoStep::TooLong);
+        }
+        let of_model = &self.model.fingers[finger];
+        let (from, to) = (grasp.world_from_object.to_pose(), end.world_from_object.to_pose());
+        let between = Placement::from(&interpolate_pose(&from, &to, 0.5));
+        let center = between.point_to_child(&grasp.world_from_link[finger].point(of_model.ik.center_in_body()));
+        let middle = Touch::of(&self.model.view.object.surface, &center).ok_or(NoStep::TooLong)?;
+        let object_from_link = between.rotation.transpose() * grasp.world_from_link[finger].rotation;
+        let half = |from: &Touch, to: &Touch, turn: &Vector| slip(of_model.tip_radius, &from.ball, &to.ball, turn);
+        let first = turn_between(&grasp.object_from_link(finger), &object_from_link);
+        let second = turn_between(&object_from_link, &end.object_from_link(finger));
+        let halves = half(&grasp.touches[finger], &middle, &first) + half(&middle, &end.touches[finger], &second);
+        if slid.angle(&halves) > MOST_TURNED_ASIDE { Err(NoStep::TooLong) } else { Ok(halves) }
+    }
+
+    /// Some forces at both ends of a step, with the sliding of the step.
     fn balanced(
         &self,
         grasp: &TrackingGrasp,
         end: &TrackingGrasp,
         relative: &PerFinger<Relative>,
+        seconds: f64,
     ) -> Result<[Forces; 2], NoStep> {
-        let at_end = self.balanced_at(end, grasp, end, relative, None)?;
-        Ok([self.balanced_at(grasp, grasp, end, relative, Some(&at_end))?, at_end])
+        let weight = self.forces.weight_in_world();
+        let at = |here, near: Option<&Forces>| {
+            self.balanced_under(&weight, (here, grasp, end), (relative, seconds), near, Choice::Any)
+        };
+        let at_end = at(end, None)?;
+        Ok([at(grasp, Some(&at_end))?, at_end])
+    }
+
+    /// The best forces at the beginning of `step`, which begins at `start`.
+    pub fn best_forces_at_start(&self, start: &TrackingGrasp, step: &TrackingStep) -> Forces {
+        self.best_forces(start, (start, step), &step.forces[0])
+    }
+
+    /// The best forces at the end of `step`, which begins at `start`.
+    pub fn best_forces_at_end(&self, start: &TrackingGrasp, step: &TrackingStep) -> Forces {
+        self.best_forces(&step.end, (start, step), &step.forces[1])
+    }
+
+    /// The best forces near those of the search. These balance too, and are kept should the best not be found from them.
+    fn best_forces(
+        &self,
+        here: &TrackingGrasp,
+        (start, step): (&TrackingGrasp, &TrackingStep),
+        near: &Forces,
+    ) -> Forces {
+        let weight = self.forces.weight_in_world();
+        let grasps = (here, start, &step.end);
+        let of_step = (&step.relative, step.seconds);
+        self.balanced_under(&weight, grasps, of_step, Some(near), Choice::Best).unwrap_or_else(|_| near.clone())
     }
 
     /// Forces at `grasp` where nothing moves.
-    pub fn balanced_at_rest(&self, grasp: &TrackingGrasp) -> Result<Forces, NoStep> {
+    pub fn balanced_at_rest(&self, grasp: &TrackingGrasp, choice: Choice) -> Result<Forces, NoStep> {
         let relative: PerFinger<Relative> = grasp.touches.iter().map(|_| Relative::STILL).collect();
-        self.balanced_at(grasp, grasp, grasp, &relative, None)
+        let at_rest = (&relative, self.settings.time_step);
+        self.balanced_under(&self.forces.weight_in_world(), (grasp, grasp, grasp), at_rest, None, choice)
     }
 
-    /// Forces at `here`, an end of the step between two grasps in which the fingertips move as `relative` has it;
-    /// `near` may be those of a moment close by.
-    fn balanced_at(
-        &self,
-        here: &TrackingGrasp,
-        from: &TrackingGrasp,
-        to: &TrackingGrasp,
-        relative: &PerFinger<Relative>,
-        near: Option<&Forces>,
-    ) -> Result<Forces, NoStep> {
-        self.balanced_under(&self.forces.weight_in_world(), (here, from, to), relative, near)
-    }
-
-    /// As [`Self::balanced_at`], under a weight in the world that need not be the object's own.
+    /// Forces at `here`, an end of the step between two grasps in which the fingertips move as `relative` has it in `seconds`, under a weight in the
+    /// world that need not be the object's own; `near` may be those of a moment close by.
     fn balanced_under(
         &self,
         weight: &Vector,
         (here, from, to): (&TrackingGrasp, &TrackingGrasp, &TrackingGrasp),
-        relative: &PerFinger<Relative>,
+        (relative, seconds): (&PerFinger<Relative>, f64),
         near: Option<&Forces>,
+        choice: Choice,
     ) -> Result<Forces, NoStep> {
         let (model, object) = (self.model, &here.world_from_object);
         let load = self.load(weight, object);
-        let seconds = self.settings.time_step;
         let pressing = |finger: usize| {
             let Relative { mode, slid, .. } = &relative[finger];
             let (point, normal) = (here.touches[finger].foot.point_in_object, here.touches[finger].ball.normal);
@@ -380,7 +468,11 @@ impl<'m, 'a> Stepper<'m, 'a> {
             }
         };
         let contacts: PerFinger<Pressing> = (0..model.n_fingers()).map(pressing).collect();
-        let forces = balance(&contacts, &load, near).map_err(|_| NoStep::Unbalanced)?;
+        let choice = if self.is_always_strong { choice } else { Choice::Best };
+        let forces = balance(&contacts, &load, near, choice).map_err(|_| NoStep::Unbalanced)?;
+        if self.is_always_strong {
+            return Ok(forces);
+        }
         let is_strong = |finger: usize| {
             let contact = object.point(&contacts[finger].point);
             let torques = self.torques(here, finger, &contact, &object.vector(&forces[finger]));
@@ -389,9 +481,8 @@ impl<'m, 'a> Stepper<'m, 'a> {
         if (0..model.n_fingers()).all(is_strong) { Ok(forces) } else { Err(NoStep::Unbalanced) }
     }
 
-    /// How the object would begin to turn in these roles, along `wanted` or against it, were forces under `weight`, in the world, all
-    /// that counts; none where the contacts tell no motion or no forces balance the weight.
-    pub fn turn_under(&self, weight: &Vector, grasp: &TrackingGrasp, roles: Roles, wanted: &Vector) -> Option<Vector> {
+    /// How the object would begin to turn in these roles, along `wanted` or against it; none where the contacts tell no motion.
+    pub fn beginning(&self, grasp: &TrackingGrasp, roles: Roles, wanted: &Vector) -> Option<Beginning> {
         let model = self.model;
         let resting: PerFinger<usize> = each(model.all_fingers() & !roles.moving).collect();
         let motion = ObjectMotion::new(model, grasp, &resting, roles.rolling, wanted)?;
@@ -406,8 +497,14 @@ impl<'m, 'a> Stepper<'m, 'a> {
         }
         let asked = Asked { roles, turn: Some(turn), rolled: Controls::default(), seconds };
         let relative = self.relative(grasp, &end, &asked).ok()?;
-        self.balanced_under(weight, (grasp, grasp, &end), &relative, None).ok()?;
-        Some(turn)
+        Some(Beginning { turn, end, relative })
+    }
+
+    /// True where forces hold the object at the beginning of `beginning`, which is at `grasp`, under `weight`, in the world: it need not be
+    /// the object's own. Forces are all that counts.
+    pub fn is_held_under(&self, weight: &Vector, grasp: &TrackingGrasp, beginning: &Beginning) -> bool {
+        let step = (&beginning.relative, self.settings.time_step);
+        self.balanced_under(weight, (grasp, grasp, &beginning.end), step, None, Choice::Any).is_ok()
     }
 
     /// What forces have to do with the object at `object`; `weight` is in the world.

@@ -79,6 +79,33 @@ fn a_turn_beyond_reach_takes_fingertips_over_edges() {
     }
 }
 
+/// Steps are long where nothing speaks against it, which leaves fewer waypoints; those of Cherif 1999 are all equal.
+#[test]
+fn long_steps_are_halved_where_they_would_be_wrong() {
+    let spans = |plan: &Plan| -> Vec<f64> {
+        let times =
+            |segment: &Segment| -> Vec<f64> { segment.waypoints.iter().map(|waypoint| waypoint.time).collect() };
+        let of = |times: Vec<f64>| times.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<f64>>();
+        plan.segments.iter().map(times).flat_map(of).collect()
+    };
+    let n_waypoints = |plan: &Plan| -> usize { plan.segments.iter().map(|segment| segment.waypoints.len()).sum() };
+    let loaded = scene("football_any_start.toml");
+    let query = turned(&loaded, 1, 0.5);
+    let default = TrackingSettings::default();
+    let short = TrackingSettings { longest_step: default.time_step, ..default.clone() };
+    let [long, short] = [&default, &short].map(|settings| planned(&loaded, &query, settings, 1).unwrap());
+    assert!(4 * n_waypoints(&long) < 3 * n_waypoints(&short), "{} {}", n_waypoints(&long), n_waypoints(&short));
+    assert!(spans(&long).iter().any(|span| *span > 0.39));
+    // A folded object: tips that come down from its edges slide in short steps. Longer ones were rejected.
+    let loaded = scene("icosahedron.toml");
+    let query = loaded.tracking(0);
+    for seed in [1, 5, 12] {
+        planned(&loaded, &query, &default, seed).unwrap_or_else(|failure| panic!("seed {seed}: {failure}"));
+    }
+    let backwards = TrackingSettings { longest_step: 0.05, ..default };
+    assert!(backwards.validate().unwrap_err().contains("longest_step"));
+}
+
 /// A search that is begun anew begins from another start grasp, unless the settings keep the first.
 #[test]
 fn other_start_grasps_help_where_the_first_does_not() {

@@ -79,6 +79,24 @@ pub fn torques(chain: &Chain, coordinates: &[f64], point: &Point, force: &Vector
     twists(chain, coordinates, point).iter().map(|[linear, _]| linear.dot(force)).collect()
 }
 
+/// A bound on the torque of each coordinate, or force of one that slides, per newton that the last body exerts within `radius` of the
+/// origin of its frame: in no posture within the limits is it more. By lengths alone; infinite behind slides without limits.
+pub fn largest_torques(chain: &Chain, radius: f64) -> Coordinates {
+    let mut largest: Coordinates = (0..chain.n_coordinates()).map(|_| 0.0).collect();
+    // From the frame that the joint carries to the contact, at most.
+    let mut distance = radius;
+    for joint in chain.joints.iter().rev() {
+        let lever = if joint.motion == JointMotion::Slide { 1.0 } else { distance };
+        joint.drive.terms.iter().for_each(|&(k, multiplier)| largest[k] += multiplier.abs() * lever);
+        distance += joint.parent_from_joint.translation.vector.norm();
+        if joint.motion == JointMotion::Slide {
+            let [low, high] = joint.drive.range(|k| [chain.lower[k], chain.upper[k]]);
+            distance += low.abs().max(high.abs());
+        }
+    }
+    largest
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -121,6 +139,8 @@ mod tests {
                 let angular = turn_between(&before.rotation, &after.rotation) / (2.0 * h);
                 assert!((linear - twists[k][0]).norm() < 1e-8 && (angular - twists[k][1]).norm() < 1e-8);
                 assert!((torques[k] - linear.dot(&force)).abs() < 1e-7);
+                let most = largest_torques(&chain, in_body.coords.norm())[k] * force.norm();
+                assert!(torques[k].abs() <= most && most < 10.0, "{} {most}", torques[k]);
             }
         }
     }

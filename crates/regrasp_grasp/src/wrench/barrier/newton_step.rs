@@ -62,6 +62,13 @@ impl<const D: usize> NewtonStep<D> {
     /// The step, and the square of its length in the metric of `H`.
     #[inline]
     pub fn solve(&self, descent: &Forces<D>, rest: &[f64; 6]) -> (Forces<D>, f64) {
+        let (step, square, _) = self.solve_both(descent, rest);
+        (step, square)
+    }
+
+    /// The same, and the multipliers `y`.
+    #[inline]
+    pub fn solve_both(&self, descent: &Forces<D>, rest: &[f64; 6]) -> (Forces<D>, f64, [f64; 6]) {
         let mut step = descent.clone();
         let mut dual = rest.map(|x| -x);
         for (Factored { factor, whitened }, z) in self.blocks.iter().zip(&mut step) {
@@ -98,7 +105,7 @@ impl<const D: usize> NewtonStep<D> {
                 z[i] *= factor[i][i];
             }
         }
-        (step, square)
+        (step, square, dual)
     }
 }
 
