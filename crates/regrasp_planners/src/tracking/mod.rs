@@ -41,7 +41,6 @@ use regrasp_manipulation::following::refuse_fingers_that_cannot_follow;
 use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::progress::Progress;
-use regrasp_manipulation::workspace::Workspace;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::{PoseData, Statistics};
 use regrasp_scene::{GraspRequest, HandView, TrackingQuery};

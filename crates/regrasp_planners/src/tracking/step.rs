@@ -6,7 +6,7 @@ use crate::tracking::grasp::{PerFinger, TrackingGrasp};
 use crate::tracking::object_motion::ObjectMotion;
 use crate::tracking::range::{lies_on_crease, stays_on_its_face};
 use crate::tracking::settings::TrackingSettings;
-use nalgebra::Rotation3;
+use nalgebra::{Matrix3, Rotation3};
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Point, UnitVector, Vector, frame, interpolate_pose};
 use regrasp_grasp::contact::rolling::{Touch, roll_step, slip, turn_between};
@@ -24,7 +24,7 @@ const UNTWISTINGS: usize = 3;
 /// A fingertip that slides slower than this, in metres per second, neither slides nor rolls for sure: friction has no direction.
 const SLOWEST: f64 = 1e-4;
 
-/// Joints go straight from step to step: half-way the tip of a long step may be turned aside by this angle.
+/// Joints and object go straight from step to step: half-way the tip of a long step may be turned aside by this angle.
 const MOST_BENT: f64 = 2e-4;
 /// Turn aside, half-way in steps, that a segment adds up: there and back it twists by twice as much, and checkers allow 2e-3.
 pub const MOST_BENT_IN_SEGMENT: f64 = 5e-4;
@@ -269,8 +269,16 @@ impl<'m, 'a> Stepper<'m, 'a> {
             let middle: Coordinates = grasp.joints[moving].iter().zip(&joints).map(|(a, b)| 0.5 * (a + b)).collect();
             let from = &grasp.world_from_link[moving].rotation;
             let whole = turn_between(from, &link.rotation);
-            let half = turn_between(from, &chain.last_frame(&middle).rotation);
-            let bent = (half - 0.5 * whole).norm();
+            let half_way = chain.last_frame(&middle).rotation;
+            let aside = (turn_between(from, &half_way) - 0.5 * whole).norm();
+            let object = interpolate_pose(&grasp.world_from_object.to_pose(), &end.world_from_object.to_pose(), 0.5);
+            let rotations = [
+                grasp.object_from_link(moving),
+                object.rotation.to_rotation_matrix().into_inner().transpose() * half_way,
+                object_from_link,
+            ];
+            let twist = twist_by_halves(&rotations, [&start.ball.normal, &touch.ball.normal]);
+            let bent = aside.max(0.5 * twist) + 0.5 * self.twist_over_edge(start, &touch, &turn);
             match is_long {
                 true if bent > MOST_BENT => return Err(NoStep::TooLong),
                 // Near where its wrist is singular.
@@ -323,6 +331,17 @@ impl<'m, 'a> Stepper<'m, 'a> {
             to = self.roll(finger, from, &turn)?;
         }
         Some((turn, to))
+    }
+
+    /// How far a ball at most twists about its normal that rolls by the rotation vector `turn` onto an edge or off one. It does not twist
+    /// half-way, nor on the whole where its normal turns evenly; but on the face the normal stands still.
+    fn twist_over_edge(&self, from: &Touch, to: &Touch, turn: &Vector) -> f64 {
+        let surface = &self.model.view.object.surface;
+        let is_even = match [from, to].map(|touch| lies_on_crease(surface, touch)) {
+            [false, false] => surface.same_face(&from.foot, &to.foot),
+            [from_edge, to_edge] => from_edge && to_edge,
+        };
+        if is_even { 0.0 } else { 0.5 * turn.norm() * (to.ball.normal - from.ball.normal).norm() }
     }
 
     /// Where the ball of `finger` touches after it has rolled by the rotation vector `turn`, in the object frame.
@@ -525,4 +544,13 @@ impl<'m, 'a> Stepper<'m, 'a> {
     pub fn torques(&self, grasp: &TrackingGrasp, finger: usize, contact: &Point, force: &Vector) -> Coordinates {
         torques(self.model.fingers[finger].ik.chain(), &grasp.joints[finger], contact, force)
     }
+}
+
+/// How far a ball twists about its normal in the two halves of a step, of which these are the rotations in the object frame and the normals
+/// at both ends. It does not twist on the whole, but half-way joints and object are in the middle of ways of their own.
+fn twist_by_halves(rotations: &[Matrix3<f64>; 3], [first, last]: [&Vector; 2]) -> f64 {
+    let twist = |half: usize, normal: Vector| {
+        turn_between(&rotations[half], &rotations[half + 1]).dot(&normal.normalize()).abs()
+    };
+    twist(0, 3.0 * first + last) + twist(1, first + 3.0 * last)
 }
