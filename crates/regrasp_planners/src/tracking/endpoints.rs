@@ -65,17 +65,28 @@ pub fn refuse_ranges_of_few(model: &Model, settings: &TrackingSettings) -> Resul
     Err(impossible(message, "leave range_coverage out, or use a hand of four fingers or more"))
 }
 
-/// How far vertices and middles of edges of the mesh are inside its convex hull at most, where that is more than `allowed`, in metres.
-/// Meshes without a hull have no inside to be dented.
+/// How far vertices and middles of edges of the mesh are inside its convex hull at most, where that is more than `allowed`, in metres;
+/// how far vertices are in front of a triangle, where no hull was found. That is never less, and more where triangles are small: with less
+/// than `allowed` there is no dent, and no hull is made. Hulls of many corners are a little too large.
 fn dent(mesh: &TriangleMesh, allowed: f64) -> Option<f64> {
-    let hull = ConvexHull::new(mesh.vertices()).ok()?;
-    let hull = Surface::of(&Shape::Convex(Arc::new(hull))).ok()?;
+    let in_front = in_front(mesh, allowed)?;
+    let hull = ConvexHull::new(mesh.vertices()).ok().map(|hull| Surface::of(&Shape::Convex(Arc::new(hull))));
+    let Some(Ok(hull)) = hull else { return Some(in_front) };
     let depth = |point: &Point| -hull.signed_distance(point);
     let corners = mesh.vertices().iter().map(depth);
     let sides = mesh.triangles().iter().flat_map(|[a, b, c]| [(a, b), (b, c), (c, a)]).filter(|(a, b)| a < b);
     let middles = sides.map(|(a, b)| depth(&center(&mesh.vertices()[*a as usize], &mesh.vertices()[*b as usize])));
     let deepest = corners.chain(middles).fold(0.0, f64::max);
     (deepest > allowed).then_some(deepest)
+}
+
+/// How far the first vertex that is more than `allowed` in front of the plane of a triangle is there, in metres.
+fn in_front(mesh: &TriangleMesh, allowed: f64) -> Option<f64> {
+    mesh.triangles().iter().find_map(|triangle| {
+        let [a, b, c] = triangle.map(|index| mesh.vertices()[index as usize]);
+        let normal = (b - a).cross(&(c - a)).try_normalize(1e-300)?;
+        mesh.vertices().iter().map(|vertex| normal.dot(&(vertex - a))).find(|distance| *distance > allowed)
+    })
 }
 
 /// The grasp at the start, and forces that hold it; one of the planner's choice by `seed` where none is given.

@@ -29,8 +29,8 @@ const MOST_BENT: f64 = 2e-4;
 /// Turn aside, half-way in steps, that a segment adds up: there and back it twists by twice as much, and checkers allow 2e-3.
 pub const MOST_BENT_IN_SEGMENT: f64 = 5e-4;
 
-/// Angle between the direction in which a tip slides in a long step and in its halves, above which the step is too long: halves are a
-/// quarter as far off, and checkers allow 0.02.
+/// Angle by which a tip slides aside of its direction in a long step, above which that is too long: between the direction of the whole and of
+/// its halves, which are a quarter as far off, and out of the planes in which it touches at both ends. Checkers allow 0.02.
 const MOST_TURNED_ASIDE: f64 = 0.01;
 
 /// Work of a step, in the unit of in-hand planning: a configuration looked at. By measurement, some 50 against 2 microseconds.
@@ -82,7 +82,7 @@ pub struct Asked {
     pub turn: Option<Vector>,
     /// How the moving fingertips roll. Fingers that cannot choose follow the object without sliding.
     pub rolled: Controls,
-    /// How long the step takes. More than the settings' step only where moving fingertips keep their faces.
+    /// How long the step takes. More than the settings' longest step only where moving fingertips keep their faces.
     pub seconds: f64,
 }
 
@@ -271,10 +271,9 @@ impl<'m, 'a> Stepper<'m, 'a> {
             let whole = turn_between(from, &link.rotation);
             let half_way = chain.last_frame(&middle).rotation;
             let aside = (turn_between(from, &half_way) - 0.5 * whole).norm();
-            let object = interpolate_pose(&grasp.world_from_object.to_pose(), &end.world_from_object.to_pose(), 0.5);
             let rotations = [
                 grasp.object_from_link(moving),
-                object.rotation.to_rotation_matrix().into_inner().transpose() * half_way,
+                object_half_way(grasp, end).rotation.transpose() * half_way,
                 object_from_link,
             ];
             let twist = twist_by_halves(&rotations, [&start.ball.normal, &touch.ball.normal]);
@@ -404,8 +403,7 @@ impl<'m, 'a> Stepper<'m, 'a> {
             return Err(NoStep::TooLong);
         }
         let of_model = &self.model.fingers[finger];
-        let (from, to) = (grasp.world_from_object.to_pose(), end.world_from_object.to_pose());
-        let between = Placement::from(&interpolate_pose(&from, &to, 0.5));
+        let between = object_half_way(grasp, end);
         let center = between.point_to_child(&grasp.world_from_link[finger].point(of_model.ik.center_in_body()));
         let middle = Touch::of(&self.model.view.object.surface, &center).ok_or(NoStep::TooLong)?;
         let object_from_link = between.rotation.transpose() * grasp.world_from_link[finger].rotation;
@@ -413,7 +411,10 @@ impl<'m, 'a> Stepper<'m, 'a> {
         let first = turn_between(&grasp.object_from_link(finger), &object_from_link);
         let second = turn_between(&object_from_link, &end.object_from_link(finger));
         let halves = half(&grasp.touches[finger], &middle, &first) + half(&middle, &end.touches[finger], &second);
-        if slid.angle(&halves) > MOST_TURNED_ASIDE { Err(NoStep::TooLong) } else { Ok(halves) }
+        // Plans say it across the normals at both ends.
+        let tilt = |touch: &Touch| (touch.ball.normal.dot(&halves) / halves.norm()).abs();
+        let aside = slid.angle(&halves) + tilt(&grasp.touches[finger]).max(tilt(&end.touches[finger]));
+        if aside > MOST_TURNED_ASIDE { Err(NoStep::TooLong) } else { Ok(halves) }
     }
 
     /// Some forces at both ends of a step, with the sliding of the step.
@@ -544,6 +545,12 @@ impl<'m, 'a> Stepper<'m, 'a> {
     pub fn torques(&self, grasp: &TrackingGrasp, finger: usize, contact: &Point, force: &Vector) -> Coordinates {
         torques(self.model.fingers[finger].ik.chain(), &grasp.joints[finger], contact, force)
     }
+}
+
+/// Where the object is half-way in a step.
+fn object_half_way(grasp: &TrackingGrasp, end: &TrackingGrasp) -> Placement {
+    let [from, to] = [grasp, end].map(|grasp| grasp.world_from_object.to_pose());
+    Placement::from(&interpolate_pose(&from, &to, 0.5))
 }
 
 /// How far a ball twists about its normal in the two halves of a step, of which these are the rotations in the object frame and the normals

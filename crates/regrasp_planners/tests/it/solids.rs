@@ -17,17 +17,17 @@ use std::path::PathBuf;
 
 type Triangles = (Vec<Point>, Vec<[u32; 3]>);
 
-/// A folder of files that make a scene.
-struct Folder(PathBuf);
+/// A folder of files that make a scene; gone when it is dropped.
+pub struct Folder(pub PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Self {
+    pub fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("regrasp-solids-{}-{name}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Folder(path)
     }
 
-    fn write(&self, name: &str, text: &str) {
+    pub fn write(&self, name: &str, text: &str) {
         std::fs::write(self.0.join(name), text).unwrap();
     }
 
