@@ -7,7 +7,7 @@
 //!   `P = -q' . (f_ext + G f')`, with `f'` the tangential parts (minimum power principle, Peshkin and Sanderson 1989); what is
 //!   then left open goes to small forces. They lie at corners of what is allowed, and jump from corner to corner;
 //! - the exact cones: forces well inside, those of `regrasp_grasp::wrench::distribute_if_any`, which changes little where contacts
-//!   change little; to a search any are good ([`Choice::Any`]). Least power is a wish beside its own for small forces across the normal and for the normal force of the settings: together
+//!   change little; to a search any are good (`Choice::Any`). Least power is a wish beside its own for small forces across the normal and for the normal force of the settings: together
 //!   they ask for `|f_t|^2 + POWER P`.
 
 use crate::tracking::settings::Cones;
