@@ -300,3 +300,26 @@ def test_the_command_line_says_kept_dropped_or_bad_input(tmp_path: Path, capsys:
     (tmp_path / "broken.json").write_text("{")
     assert main([str(tmp_path / "broken.json")]) == 2
     assert "not JSON" in capsys.readouterr().err
+
+
+def test_a_campaign_replays_plans_that_are_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from regrasp.simulate.campaign import main as campaign
+
+    plan, _ = planned("sphere_90x", seed=2)
+    for kind in ("roadmap", "single"):
+        (tmp_path / "made" / kind).mkdir(parents=True)
+        (tmp_path / "made" / kind / "2.json").write_bytes(plan.to_json())
+    scene, made = str(SCENES / "sphere_90x.toml"), str(tmp_path / "made")
+    line = [scene, "--made", made, "--gravity", "plan", "--controllers", "C2", "--first-seed", "2", "--seeds", "2", "--processes", "1"]
+    assert campaign([*line, "-o", str(tmp_path / "out")]) == 0
+    rows = (tmp_path / "out" / "campaign.csv").read_text().splitlines()
+    assert len(rows) == 5
+    text = capsys.readouterr().out
+    for kind in ("roadmap", "single"):
+        assert f"| sphere_90x | {kind} | plan | C2 | nominal | 1 of 2 | 1 of 1 |" in text
+    assert "3.json is not there" in text
+    with pytest.raises(SystemExit):
+        campaign([scene, "--made", made, "-o", str(tmp_path / "up")])
+    with pytest.raises(SystemExit):
+        campaign([scene, "--made", str(tmp_path / "nothing"), "--gravity", "plan", "-o", str(tmp_path / "out")])
+    assert "has no folder of plans" in capsys.readouterr().err

@@ -114,6 +114,23 @@ pub fn suites(names: &[String]) -> Outcome {
     page(&[])
 }
 
+/// Graphs with the defaults: name, scene, packages and what else the build is told. The Allegro hand covers its cube only near the
+/// scene's start, so that graph is of a smaller region.
+pub fn rolling_graphs(
+    packages: Option<&str>,
+) -> impl Iterator<Item = (&'static str, &'static str, &str, &'static str)> {
+    let near = "--places 200 --within 0.004 --angle 45";
+    let own = [("roadmap_rolling_sphere", "sphere_90x"), ("roadmap_rolling_box", "box_90x")]
+        .map(|(name, scene)| (name, scene, "", ""));
+    let allegro = packages.into_iter().flat_map(move |packages| {
+        [
+            ("roadmap_rolling_allegro_sphere", "allegro/sphere32_x", packages, ""),
+            ("roadmap_rolling_allegro_cube", "allegro/cube57_x", packages, near),
+        ]
+    });
+    own.into_iter().chain(allegro)
+}
+
 /// Random queries on saved graphs, and the same ones without them; `out/roadmaps` keeps the graphs.
 pub fn roadmaps(_: &[String]) -> Outcome {
     let program = regrasp()?;
@@ -123,16 +140,13 @@ pub fn roadmaps(_: &[String]) -> Outcome {
     let plain = "--settings docs/benchmarks/plain.json";
     // Defaults: fingertips roll. Few single queries, which take far longer.
     let packages = models().map(|models| package(&models));
-    let rolling = ["sphere_90x", "box_90x"].map(|scene| (scene, ""));
-    let allegro = packages.as_deref().map(|packages| ("allegro/sphere32_x", packages));
     let mut runs = vec![
         ("roadmap_sphere", "sphere_90x", "", plain, "", queries),
         ("roadmap_box", "box_90x", "", plain, "", queries),
         ("roadmap_million", "box_90x", "", plain, "--places 1700", 0),
     ];
-    let names = ["roadmap_rolling_sphere", "roadmap_rolling_box", "roadmap_rolling_allegro_sphere"];
-    let of_name = |(name, (scene, packages))| (name, scene, packages, "", "", queries / 10);
-    runs.extend(names.into_iter().zip(rolling.into_iter().chain(allegro)).map(of_name));
+    let rolling = rolling_graphs(packages.as_deref());
+    runs.extend(rolling.map(|(name, scene, packages, build)| (name, scene, packages, "", build, queries / 10)));
     for (name, scene, packages, settings, build, single) in runs {
         let graph = folder.join(format!("{name}.roadmap"));
         let graph = graph.display();

@@ -19,7 +19,7 @@ use std::process::ExitCode;
 type Task = (&'static str, &'static str, fn(&[String]) -> Outcome);
 
 /// All tasks, in the order in which `cargo xtask` lists them.
-const TASKS: [Task; 17] = [
+const TASKS: [Task; 18] = [
     (
         "reference",
         "write the generated pages of docs/reference (--check: fail if they are out of date)",
@@ -58,6 +58,11 @@ const TASKS: [Task; 17] = [
     ),
     ("replay", "replay plans in MuJoCo: six scenes, negative controls, and all in-hand scenes", replay::in_hand),
     ("replay-tracking", "replay tracking plans in MuJoCo", replay::tracking),
+    (
+        "replay-roadmap",
+        "replay answers of roadmaps in MuJoCo, beside plans for the same queries without a graph",
+        replay::roadmaps,
+    ),
     ("campaign", "same bytes on any number of threads; the checker against broken and good plans", campaign::checker),
     ("fuzz", "fuzz every reader; needs cargo-fuzz", campaign::fuzz),
     (

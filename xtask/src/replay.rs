@@ -1,6 +1,6 @@
 //! Replays in MuJoCo. They need the Python package with MuJoCo: `make python` makes it.
 
-use crate::run::{Outcome, files, joined, models, number, out, package, run, words};
+use crate::run::{Outcome, files, joined, models, number, out, package, regrasp, regrasp_with, run, words};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -90,6 +90,33 @@ pub fn tracking(_: &[String]) -> Outcome {
         let part = folder.join(part);
         campaign(&format!(
             "scenes/{scene}.toml --gravity plan --controllers {controllers} {settings} --seeds {seeds} -o {} --name {name}",
+            part.display()
+        ))?;
+        keep(&part)?;
+    }
+    Ok(())
+}
+
+/// Random queries of roadmaps with the defaults, replayed beside the same queries planned without the graph.
+pub fn roadmaps(_: &[String]) -> Outcome {
+    needs_python()?;
+    let program = regrasp()?;
+    let folder = out("replay-roadmap")?;
+    let queries = number("ROADMAP_QUERIES", 50)?;
+    let packages = models().map(|models| package(&models));
+    for (name, scene, packages, build) in crate::bench::rolling_graphs(packages.as_deref()) {
+        let (graph, plans) = (folder.join(format!("{name}.roadmap")), folder.join(name).join("plans"));
+        let (graph, plans) = (graph.display(), plans.display());
+        regrasp_with(&program, &format!("roadmap build scenes/{scene}.toml {packages} -o {graph} {build}"))?;
+        regrasp_with(
+            &program,
+            &format!(
+                "roadmap bench {graph} scenes/{scene}.toml {packages} --queries {queries} --single {queries} --plans {plans}"
+            ),
+        )?;
+        let part = folder.join(name).join("replays");
+        campaign(&format!(
+            "scenes/{scene}.toml {packages} --gravity plan --made {plans} --controllers B,C2 --seeds {queries} -o {} --name {name}",
             part.display()
         ))?;
         keep(&part)?;

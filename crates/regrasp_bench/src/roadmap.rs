@@ -16,17 +16,25 @@ use std::time::Instant;
 /// Queries that are answered one right after the other before any of their plans is judged.
 pub const BLOCK: usize = 100;
 
+/// The method of rows of queries that a graph answered.
+pub const METHOD: &str = "roadmap";
+
 /// Answers queries, one right after the other as a user of a graph asks them; plans the first `n_single` of them without the
-/// graph; then judges the plans and measures both. Times are of the query alone: the roadmap is open.
+/// graph; then judges the plans and measures both. Times are of the query alone: the roadmap is open. `keep` is given each plan with
+/// its row, before it is judged; one of the graph has the method [`METHOD`].
 pub fn run(
     planner: &RoadmapPlanner,
     problems: &[Problem],
     n_single: usize,
     settings: &RunSettings,
     memory: &mut QueryMemory,
+    keep: &mut dyn FnMut(&Row, &Plan),
 ) -> Vec<Row> {
     let answers: Vec<_> = problems.iter().map(|&problem| answer(planner, problem, settings, memory)).collect();
     let singles: Vec<_> = problems.iter().take(n_single).map(|&problem| plan_only(problem, settings)).collect();
+    for (row, plan) in answers.iter().chain(&singles) {
+        plan.iter().for_each(|plan| keep(row, plan));
+    }
     let mut singles = singles.into_iter();
     let mut rows = Vec::with_capacity(2 * problems.len());
     for (&problem, answer) in problems.iter().zip(answers) {
@@ -43,7 +51,7 @@ fn answer(
     settings: &RunSettings,
     memory: &mut QueryMemory,
 ) -> (Row, Option<Plan>) {
-    let mut row = Row { scene: problem.name(), method: "roadmap".into(), seed: problem.seed, ..Row::default() };
+    let mut row = Row { scene: problem.name(), method: METHOD.into(), seed: problem.seed, ..Row::default() };
     let started = (Instant::now(), ThreadTime::now());
     let budget = Budget {
         max_work: settings.max_work,
@@ -137,7 +145,7 @@ impl GraphFacts {
 /// Answered queries, and the same ones planned without the graph; then the graphs.
 pub(crate) fn section(parts: &[(String, Vec<Row>)], graphs: &[GraphFacts], out: &mut String) {
     let mut lines = String::new();
-    for (name, rows) in parts.iter().filter(|(_, rows)| rows.iter().any(|row| row.method == "roadmap")) {
+    for (name, rows) in parts.iter().filter(|(_, rows)| rows.iter().any(|row| row.method == METHOD)) {
         line(name, rows, &mut lines);
     }
     if !lines.is_empty() {
@@ -172,7 +180,7 @@ pub(crate) fn section(parts: &[(String, Vec<Row>)], graphs: &[GraphFacts], out: 
 }
 
 fn line(name: &str, rows: &[Row], out: &mut String) {
-    let (with, without): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|row| row.method == "roadmap");
+    let (with, without): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|row| row.method == METHOD);
     let answered: Vec<&&Row> = with.iter().filter(|row| row.status == "solved").collect();
     let accepted = answered.iter().filter(|row| row.accepted == Some(true)).count();
     let time_of = |rows: &[&Row], wanted: &Row| {

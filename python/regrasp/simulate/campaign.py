@@ -4,7 +4,8 @@
 
 Plans are made for the direction of gravity that they are replayed in. Every plan and every result is kept in the output
 folder, one file each, and what is there is not done again: a campaign that was cut off goes on where it was. The same
-arguments give the same tables on any number of processes.
+arguments give the same tables on any number of processes. With ``--made DIR`` nothing is planned: the plans of one scene are
+those in ``DIR/KIND/SEED.json``, as ``regrasp roadmap bench --plans DIR`` writes them.
 """
 
 from __future__ import annotations
@@ -62,6 +63,8 @@ class Job:
     time_limit: float | None
     max_work: int
     folder: str
+    made: str | None = None
+    """Folder of plans that are there already."""
 
     @property
     def scene_name(self) -> str:
@@ -72,6 +75,8 @@ class Job:
     @property
     def plan_path(self) -> Path:
         """Where the plan is kept."""
+        if self.made is not None:
+            return Path(self.made) / self.variant / f"{self.seed}.json"
         return Path(self.folder) / "plans" / self.variant / self.scene_name / f"{self.gravity}-{self.seed}.json"
 
     def result_path(self, controller: str) -> Path:
@@ -167,6 +172,8 @@ def _plan(job: Job, scene: Any) -> tuple[Any, str]:
     failed = job.plan_path.with_suffix(".failed")
     if failed.exists():
         return None, failed.read_text()
+    if job.made is not None:
+        return None, f"{job.plan_path} is not there"
     settings = {**json.loads(job.settings), **VARIANTS[job.variant]}
     if job.gravity != "plan":
         scene = regrasp.load_scene(job.scene, packages=dict(job.packages), gravity=_down(job, scene))
@@ -312,12 +319,22 @@ def _pair(rows: list[dict[str, Any]], of: Any, mm: str, deg: str) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    variants: list[str] = options.variants
+    if options.made is not None:
+        if len(options.scenes) != 1 or options.gravity != ["plan"] or options.settings:
+            parser.error("--made takes one scene, --gravity plan and no --settings: the plans are there already")
+        variants = sorted(entry.name for entry in options.made.iterdir() if entry.is_dir()) if options.made.is_dir() else []
+        if not variants:
+            parser.error(f"argument --made: {options.made} has no folder of plans")
     settings: dict[str, Any] = json.loads(options.settings.read_text()) if options.settings else {}
+    if options.made is not None:
+        settings = {"made": str(options.made.resolve())}
     options.output.mkdir(parents=True, exist_ok=True)
     made_with = options.output / "settings.json"
     if made_with.exists() and json.loads(made_with.read_text()) != settings:
-        print(f"error: the plans in {options.output} were made with other settings ({made_with})", file=sys.stderr)
+        print(f"error: the plans in {options.output} are others ({made_with})", file=sys.stderr)
         return 2
     _write(made_with, json.dumps(settings))
     jobs = [
@@ -338,9 +355,10 @@ def main(arguments: list[str] | None = None) -> int:
             time_limit=options.time_limit or (None if options.max_work else 60.0),
             max_work=options.max_work or MAX_WORK,
             folder=str(options.output),
+            made=None if options.made is None else str(options.made),
         )
         for scene in options.scenes
-        for variant in options.variants
+        for variant in variants
         for gravity in options.gravity
         for friction in options.friction_scale
         for mass in options.mass_scale
@@ -393,6 +411,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--gravity", type=words(GRAVITIES), default=["up", "down", "side"], help="of up, down, side, plan [default: up,down,side]")
     parser.add_argument("--controllers", type=words(CONTROLLERS), default=["B", "C2"], help="[default: B,C2]")
     parser.add_argument("--variants", type=words(tuple(VARIANTS)), default=["default"], help=f"of {', '.join(VARIANTS)}")
+    parser.add_argument("--made", type=Path, metavar="DIR", help="replay DIR/KIND/SEED.json, plans of one scene, with every KIND; needs --gravity plan")
     parser.add_argument("--friction-scale", type=scales, default=[1.0])
     parser.add_argument("--mass-scale", type=scales, default=[1.0])
     parser.add_argument("--speed", type=scales, default=[1.0])

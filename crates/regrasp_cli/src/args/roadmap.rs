@@ -141,6 +141,10 @@ pub struct RoadmapBench {
     /// Write what the graph is like and how long it takes to load
     #[arg(long, value_name = "FILE.json")]
     pub graph: Option<PathBuf>,
+    /// Write every plan: DIR/roadmap/SEED.json, and DIR/single/SEED.json of those planned without the graph. Each says its start and
+    /// goal, so that `regrasp check --own-query` judges it
+    #[arg(long, value_name = "DIR")]
+    pub plans: Option<PathBuf>,
     /// Do not judge the plans
     #[arg(long)]
     pub no_check: bool,

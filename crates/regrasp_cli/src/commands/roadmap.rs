@@ -16,13 +16,14 @@ use crate::words::{counted, duration, grouped};
 use regrasp::base::files;
 use regrasp::pictures::{roadmap_from_first, roadmap_story};
 use regrasp::plan::check::Level;
+use regrasp::plan::{Plan, format, plan::Asked};
 use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::TransferMode;
 use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
 };
 use regrasp::{Budget, InHandQuery, Query};
-use regrasp_bench::row::Judge;
+use regrasp_bench::row::{Judge, Row};
 use regrasp_bench::{Problem, RunSettings, csv, roadmap as bench, summarise, summary};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -328,13 +329,20 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
     };
     let mut memory = QueryMemory::default();
     let mut rows = Vec::new();
+    let mut unwritable = None;
     let seeds: Vec<u64> = (0..arguments.queries).map(|number| arguments.first_seed.saturating_add(number)).collect();
     let mut n_single = usize::try_from(arguments.single).unwrap_or(usize::MAX);
     for block in seeds.chunks(bench::BLOCK) {
         let queries: Vec<_> = block.iter().map(|&seed| Query::from(planner.random_query(seed))).collect();
         let problem = |(query, &seed)| Problem { task: loaded.manipulation(), query, seed };
         let problems: Vec<Problem> = queries.iter().zip(block).map(problem).collect();
-        let found = bench::run(&planner, &problems, n_single, &settings, &mut memory);
+        let mut keep = |row: &Row, plan: &Plan| {
+            let query = problems.iter().find(|problem| problem.seed == row.seed).map(|problem| problem.query);
+            if let (Some(folder), Some(query), None) = (&arguments.plans, query, &unwritable) {
+                unwritable = write_plan(folder, row, query, plan).err();
+            }
+        };
+        let found = bench::run(&planner, &problems, n_single, &settings, &mut memory, &mut keep);
         n_single = n_single.saturating_sub(block.len());
         if cancelled.load(Ordering::Relaxed) {
             return Err(Stop::Interrupted);
@@ -346,6 +354,9 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
             }
             rows.push(row);
         }
+    }
+    if let Some(stop) = unwritable {
+        return Err(stop);
     }
     if let (Some(writer), Some(path)) = (writer, &arguments.csv) {
         writer.finish().map_err(|error| Stop::unwritable(path, &error))?;
@@ -364,4 +375,22 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
         talk.data(&summary::table(&summaries));
     }
     Ok(())
+}
+
+/// Writes the plan of a random query. It says which: no scene file has its start and its goal.
+fn write_plan(folder: &Path, row: &Row, query: &Query, plan: &Plan) -> Result<(), Stop> {
+    let way = if row.method == bench::METHOD { "roadmap" } else { "single" };
+    let path = folder.join(way).join(format!("{}.json", row.seed));
+    let asked = plan.segments.first().and_then(|segment| segment.waypoints.first()).map(|first| {
+        let fingers = plan.fingers.iter().zip(&first.contacts);
+        Box::new(Asked {
+            start: query.start().into(),
+            goal: query.goal().into(),
+            joints: first.joints.clone(),
+            free: fingers.filter(|(_, contact)| !contact.holds()).map(|(finger, _)| finger.clone()).collect(),
+        })
+    });
+    let text = format::to_json(&Plan { asked, ..plan.clone() });
+    make_folder_of(&path)?;
+    files::write_atomic(&path, text.as_bytes()).map_err(|error| Stop::unwritable(&path, &error))
 }

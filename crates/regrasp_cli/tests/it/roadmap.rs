@@ -153,6 +153,43 @@ fn a_bench_writes_rows_and_facts_that_the_page_takes() {
 }
 
 #[test]
+fn a_bench_writes_plans_that_say_what_they_were_asked() {
+    let folder = folder_with_graph();
+    let bench = folder.run(&[
+        "roadmap",
+        "bench",
+        "a.roadmap",
+        "scene.toml",
+        "--queries",
+        "3",
+        "--single",
+        "2",
+        "--plans",
+        "plans",
+    ]);
+    assert_eq!(bench.code, Some(0), "{bench:?}");
+    let check =
+        |plan: &str, more: &[&str]| folder.run(&[&["check", plan, "--scene", "scene.toml"], more].concat()).code;
+    for plan in ["plans/roadmap/0.json", "plans/roadmap/2.json", "plans/single/1.json"] {
+        assert_eq!(check(plan, &["--own-query"]), Some(0), "{plan}");
+        assert_ne!(check(plan, &[]), Some(0), "{plan} is no answer to the scene's query");
+    }
+    let asked = |plan: &str| {
+        let text = std::fs::read_to_string(folder.path(plan)).unwrap();
+        let plan: serde_json::Value = serde_json::from_str(&text).unwrap();
+        (plan["asked"]["start"].clone(), plan["asked"]["goal"].clone())
+    };
+    assert_eq!(asked("plans/roadmap/1.json"), asked("plans/single/1.json"), "the same query");
+    assert_ne!(asked("plans/roadmap/0.json"), asked("plans/roadmap/1.json"));
+    assert!(!folder.path("plans/single/2.json").exists(), "two were planned without the graph");
+
+    folder.write("file", b"");
+    let refused = folder.run(&["roadmap", "bench", "a.roadmap", "scene.toml", "--queries", "1", "--plans", "file"]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.err.contains("file"), "{refused:?}");
+}
+
+#[test]
 fn the_file_of_the_fuzz_seed_answers_too() {
     let folder = Folder::new();
     folder.write("a.roadmap", ROADMAP);

@@ -160,7 +160,7 @@ fn a_contact_near_an_edge_of(shape: Shape) {
     }
 }
 
-/// A leap is rejected for what it is, and motion bounds do not follow it for minutes.
+/// A leap is rejected for what it is, and motion bounds do not follow it for minutes: a hundredth of the work that is allowed is enough.
 #[test]
 fn leaps_are_rejected_at_once_and_the_report_says_what_was_left_out() {
     let scene = sample::scene();
@@ -168,9 +168,9 @@ fn leaps_are_rejected_at_once_and_the_report_says_what_was_left_out() {
     for value in [20.0, 1e3, 1e4, 1e6, -1e6] {
         let mut leaping = plan.clone();
         leaping.segments[1].waypoints[2].joints[2] = value;
-        let started = std::time::Instant::now();
-        let report = judge(&scene, &leaping);
-        assert!(started.elapsed().as_secs_f64() < 2.0, "{value}: {:?}", started.elapsed());
+        let most_work = CheckSettings::default().most_work / 100;
+        let settings = CheckSettings { level: Level::Geometry, most_work, ..CheckSettings::default() };
+        let report = check((&scene, &sample::state(&scene)), Some(&sample::query(&leaping)), &leaping, &settings);
         let kinds = kinds(&report);
         for kind in [ViolationKind::JointLimit, ViolationKind::JointJump] {
             assert!(kinds.contains(&kind), "{value}: {kinds:?}");
