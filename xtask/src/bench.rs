@@ -98,7 +98,8 @@ pub fn all(_: &[String]) -> Outcome {
 }
 
 /// The suites named, or all, then the page: one command makes all tables and figures of the papers again. A suite that was cut off goes
-/// on where it was. `SUITE_SEEDS`: at most so many trials per row; `AT_ONCE`: trials at a time.
+/// on where it was. `SUITE_SEEDS`: at most so many trials per row; `AT_ONCE`: trials at a time, each on one
+/// thread (default: 2, where the machine has two cores).
 pub fn suites(names: &[String]) -> Outcome {
     let program = regrasp()?;
     unpack()?;
@@ -107,7 +108,8 @@ pub fn suites(names: &[String]) -> Outcome {
         0 => String::new(),
         seeds => format!("--seeds {seeds}"),
     };
-    let at_once = number("AT_ONCE", 1)?;
+    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
+    let at_once = number("AT_ONCE", cores.min(2))?;
     for name in if names.is_empty() { &all } else { names } {
         regrasp_with(&program, &format!("bench suites/{name}.toml --at-once {at_once} {limit}"))?;
     }
@@ -238,12 +240,18 @@ fn write_page(program: &Path, page: &str) -> Outcome {
     )
 }
 
-/// Unpacks the compressed rows beside their archives.
+/// Unpacks the compressed rows beside their archives. Rows that were measured after their archive was made stay.
 fn unpack() -> Outcome {
-    for archive in compressed()? {
-        run("gzip", &words(&format!("-dkf {}", archive.display())))?;
-    }
-    Ok(())
+    compressed()?
+        .iter()
+        .filter(|archive| is_newest(archive))
+        .try_for_each(|archive| run("gzip", &words(&format!("-dkf {}", archive.display()))))
+}
+
+/// True where the rows beside an archive are not newer than it, or are not there.
+fn is_newest(archive: &Path) -> bool {
+    let modified = |path: &Path| fs::metadata(path).and_then(|metadata| metadata.modified()).ok();
+    modified(archive) >= modified(&archive.with_extension(""))
 }
 
 /// Compresses rows above [`LARGEST_CSV`] and leaves the archives alone. The same rows give the same bytes.
@@ -251,8 +259,12 @@ pub fn pack() -> Outcome {
     for folder in folders()? {
         for file in files(&folder, ".csv")? {
             let size = fs::metadata(&file).map_err(|error| format!("{}: {error}", file.display()))?.len();
+            let archive = file.with_extension("csv.gz");
             if size > LARGEST_CSV {
                 run("gzip", &words(&format!("-9nf {}", file.display())))?;
+            } else if archive.is_file() {
+                // Of rows that were more.
+                fs::remove_file(&archive).map_err(|error| format!("{}: {error}", archive.display()))?;
             }
         }
     }
@@ -320,6 +332,22 @@ pub fn arms(_: &[String]) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_that_are_newer_than_their_archive_are_not_unpacked_over() {
+        let folder = std::env::temp_dir().join(format!("regrasp-xtask-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let (rows, archive) = (folder.join("rows.csv"), folder.join("rows.csv.gz"));
+        fs::write(&archive, "old").unwrap();
+        assert!(is_newest(&archive), "no rows are there");
+        fs::write(&rows, "new").unwrap();
+        let later = fs::metadata(&archive).unwrap().modified().unwrap() + std::time::Duration::from_secs(1);
+        fs::File::options().write(true).open(&rows).unwrap().set_modified(later).unwrap();
+        assert!(!is_newest(&archive));
+        fs::File::options().write(true).open(&archive).unwrap().set_modified(later).unwrap();
+        assert!(is_newest(&archive), "as old as the rows that it was unpacked to");
+        fs::remove_dir_all(&folder).unwrap();
+    }
 
     #[test]
     fn results_that_are_older_than_the_page_are_found() {

@@ -1,5 +1,5 @@
 //! Links of README, the book and the other documents: every file and heading that they name exists. Pages of the book lead out of the
-//! book by full addresses only, and every page is in its table of contents.
+//! book by full addresses only, every page is in its table of contents, and tables are whole.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -151,6 +151,25 @@ fn dead_links_are_found() {
     }
     assert_eq!(fault(from, "concepts/margin.md#what-regrasp-does"), None);
     assert_eq!(links("see [a](b.md) and ![c\nd](e.svg), not `[x](y)`"), ["b.md", "e.svg"]);
+}
+
+/// Lines of tables that have another number of cells than the line before, from 1.
+fn uneven_rows(text: &str) -> Vec<usize> {
+    let cells = |line: &str| line.starts_with('|').then(|| line.replace("\\|", "").matches('|').count());
+    let counts: Vec<Option<usize>> = prose(text).lines().map(cells).collect();
+    let is_uneven = |pair: &[Option<usize>]| pair[0].zip(pair[1]).is_some_and(|(before, here)| before != here);
+    counts.windows(2).enumerate().filter(|(_, pair)| is_uneven(pair)).map(|(at, _)| at + 2).collect()
+}
+
+#[test]
+fn rows_of_tables_have_as_many_cells_as_their_heads() {
+    assert_eq!(uneven_rows("| a | b |\n|---|---|\n| `x|y` | 1 \\| 2 |\n\n| a |\n|---|\n| 1 | 2 |\n"), [7]);
+    let uneven = |path: &PathBuf| {
+        let rows = uneven_rows(&fs::read_to_string(root().join(path)).expect("a document"));
+        (!rows.is_empty()).then(|| format!("{}: lines {rows:?}", path.display()))
+    };
+    let faults: Vec<String> = documents().iter().filter_map(uneven).collect();
+    assert!(faults.is_empty(), "{faults:#?}");
 }
 
 #[test]

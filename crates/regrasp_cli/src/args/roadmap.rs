@@ -54,7 +54,8 @@ pub struct RoadmapBuild {
     /// Settings of the planner, with the keys of a plan file
     #[arg(long, value_name = "FILE.json")]
     pub settings: Option<PathBuf>,
-    /// Force-closure margin that the holding fingers keep, in [0, 1)
+    /// Force-closure margin that the holding fingers keep, in [0, 1) [default: 0.02, or 0.005 where
+    /// that connects more of the region; with --settings that of the file]
     #[arg(long, value_parser = margin, allow_negative_numbers = true)]
     pub margin: Option<f64>,
     /// Seed

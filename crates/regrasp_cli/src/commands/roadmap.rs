@@ -18,10 +18,10 @@ use regrasp::pictures::{roadmap_from_first, roadmap_story};
 use regrasp::plan::check::Level;
 use regrasp::plan::{Plan, format, plan::Asked};
 use regrasp::planners::FailureKind;
-use regrasp::planners::in_hand::TransferMode;
 use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
 };
+use regrasp::planners::in_hand::{FirstTry, InHandSettings, TransferMode};
 use regrasp::{Budget, InHandQuery, Query};
 use regrasp_bench::row::{Judge, Row};
 use regrasp_bench::{Problem, RunSettings, csv, roadmap as bench, summarise, summary};
@@ -95,13 +95,55 @@ fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Re
             }),
         );
     };
-    let built = build_roadmap(&view, &region, &build, &settings, arguments.seed, &budget, &progress);
-    let roadmap = match built {
-        Ok(roadmap) => roadmap,
-        Err(failure) if failure.kind == FailureKind::Interrupted => return Err(Stop::Interrupted),
-        Err(failure) => return Err(Stop::NoPlan(Box::new(failure))),
+    let build = |settings: &InHandSettings| {
+        build_roadmap(&view, &region, &build, settings, arguments.seed, &budget, &progress).map_err(|failure| {
+            match failure.kind {
+                FailureKind::Interrupted => Stop::Interrupted,
+                _ => Stop::NoPlan(Box::new(failure)),
+            }
+        })
     };
-    save(&roadmap, &arguments.output, talk)
+    // Settings of a file are whole: a margin that it leaves out is the usual one.
+    if arguments.margin.is_some() || arguments.settings.is_some() {
+        return save(&build(&settings)?, &arguments.output, talk);
+    }
+    save(&careful_if_possible(&settings, build, talk)?, &arguments.output, talk)
+}
+
+/// Share of its places that a graph should connect.
+const COVERED: f64 = 0.95;
+
+/// A graph with the closure margin that a search for one plan asks for first: plans from graphs that keep less drop the object more often than
+/// single plans do (docs/how-to/many-queries.md). Where it connects few of its places, one with the usual margin, if that connects more.
+fn careful_if_possible(
+    settings: &InHandSettings,
+    build: impl Fn(&InHandSettings) -> Result<GraspRoadmap, Stop>,
+    talk: &Talk,
+) -> Result<GraspRoadmap, Stop> {
+    let covered = |roadmap: &GraspRoadmap| {
+        let census = roadmap.census();
+        census.places_covered as f64 / census.places.max(1) as f64
+    };
+    let usual = settings.physics.closure_margin;
+    let mut careful = settings.clone();
+    careful.physics.closure_margin = FirstTry::default().closure_margin.max(usual);
+    let why = match build(&careful) {
+        Ok(roadmap) if covered(&roadmap) >= COVERED => return Ok(roadmap),
+        Ok(roadmap) => Ok(roadmap),
+        Err(Stop::NoPlan(failure)) => Err(failure),
+        Err(stop) => return Err(stop),
+    };
+    let (kept, share) = (careful.physics.closure_margin, why.as_ref().map_or(0.0, covered));
+    talk.say(format!(
+        "build  with a closure margin of {kept} only {:.0} % of the places are connected: again with {usual}",
+        100.0 * share
+    ));
+    talk.event("again", json!({ "closure_margin": kept, "covered": share, "next_closure_margin": usual }));
+    match (build(settings), why) {
+        (Ok(roadmap), Ok(careful)) if covered(&roadmap) <= covered(&careful) => Ok(careful),
+        (Err(Stop::NoPlan(_)), Ok(careful)) => Ok(careful),
+        (result, _) => result,
+    }
 }
 
 /// Writes a roadmap whole or not at all and says what it is.

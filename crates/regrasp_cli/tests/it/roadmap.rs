@@ -152,6 +152,31 @@ fn a_bench_writes_rows_and_facts_that_the_page_takes() {
     assert!(text.contains(&facts), "{facts} in {text}");
 }
 
+/// A graph keeps the margin that single searches ask for first, unless it connects too little.
+#[test]
+fn a_build_asks_for_a_large_margin_and_for_less_where_that_connects_little() {
+    let margin = |folder: &Folder| info(folder)["about"]["settings"]["closure_margin"].as_f64().unwrap();
+    let folder = folder_with_graph();
+    assert_eq!(margin(&folder), 0.02);
+    let build = |scene: &str, more: &[&str]| {
+        let arguments =
+            ["roadmap", "build", scene, "-o", "a.roadmap", "--build-settings", "build.json", "--within", "0.005"];
+        let run = folder.run(&[&arguments, more].concat());
+        assert_eq!(run.code, Some(0), "{run:?}");
+        run.out + &run.err
+    };
+    let said = build("scene.toml", &["--seed", "1", "--margin", "0.005"]);
+    assert!(!said.contains("again"), "{said}");
+    assert_eq!(margin(&folder), 0.005);
+    // A hand of short reach: few places are connected with either margin, and the graph that connects more is kept.
+    let tight = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/tight_box_90x.toml");
+    let said = build(tight, &["--seed", "1", "--json"]);
+    let events = said.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let again: Vec<Value> = events.filter(|event| event["event"] == "again").collect();
+    assert_eq!(again.len(), 1, "{said}");
+    assert!(again[0]["covered"].as_f64().unwrap() < 0.95 && again[0]["next_closure_margin"] == 0.005, "{again:?}");
+}
+
 #[test]
 fn a_bench_writes_plans_that_say_what_they_were_asked() {
     let folder = folder_with_graph();

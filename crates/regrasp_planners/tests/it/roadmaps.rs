@@ -214,6 +214,9 @@ fn settings_that_decide_what_is_feasible_are_refused_when_they_changed() {
         let text = refused.to_string();
         assert!(text.contains("R615") && text.contains(name), "{text}");
     }
+    let mut less = roadmap.about().settings.clone();
+    less.physics.closure_margin *= 0.5;
+    assert!(roadmap.refuse_other_settings(path, &less).is_ok(), "the roadmap keeps more than is asked");
     let searching = InHandSettings {
         n_threads: 7,
         search: SearchSettings { shortcuts: 99, candidates: 2, ..roadmap.about().settings.clone().search },

@@ -226,12 +226,18 @@ impl GraspRoadmap {
         if diagnostics.is_empty() { Ok(()) } else { Err(InputError { diagnostics, n_more: 0 }) }
     }
 
-    /// Refuses settings that other motions are feasible with than those of the roadmap: the closure margin, the release rule,
-    /// steps and distances. What only steers a search may differ. `path` is where the roadmap came from.
+    /// Refuses settings that other motions are feasible with than those of the roadmap: a larger closure margin, another release rule,
+    /// other steps and distances. What only steers a search may differ. `path` is where the roadmap came from.
     ///
-    /// Errors: `R615`, one for each setting that differs.
+    /// Errors: `R615`, one for each such setting.
     pub fn refuse_other_settings(&self, path: &Path, asked: &InHandSettings) -> Result<(), InputError> {
-        let (built, asked) = (feasibility(&self.about.settings), feasibility(asked));
+        let mut asked = asked.clone();
+        let kept = self.about.settings.physics.closure_margin;
+        if asked.physics.closure_margin < kept {
+            // Who keeps more keeps that as well.
+            asked.physics.closure_margin = kept;
+        }
+        let (built, asked) = (feasibility(&self.about.settings), feasibility(&asked));
         let differing = built.iter().zip(&asked).filter(|((_, was), (_, is))| was != is);
         let diagnostics: Vec<Diagnostic> = differing
             .map(|((name, was), (_, is))| {
