@@ -318,6 +318,14 @@ def test_a_campaign_replays_plans_that_are_there(tmp_path: Path, capsys: pytest.
     for kind in ("roadmap", "single"):
         assert f"| sphere_90x | {kind} | plan | C2 | nominal | 1 of 2 | 1 of 1 |" in text
     assert "3.json is not there" in text
+    # A plan that was written since is replayed; what is there of the others stays.
+    results = sorted((tmp_path / "out" / "results").rglob("plan-2.json"))
+    before = [path.stat().st_mtime_ns for path in results]
+    (tmp_path / "made" / "single" / "2.json").write_bytes(plan.to_json())
+    assert campaign([*line, "-o", str(tmp_path / "out")]) == 0
+    again = {path.parts[-4] for path, time in zip(results, before) if path.stat().st_mtime_ns != time}
+    assert again == {"single"}
+    capsys.readouterr()
     with pytest.raises(SystemExit):
         campaign([scene, "--made", made, "-o", str(tmp_path / "up")])
     with pytest.raises(SystemExit):

@@ -105,7 +105,12 @@ pub fn roadmaps(_: &[String]) -> Outcome {
     let queries = number("ROADMAP_QUERIES", 50)?;
     let packages = models().map(|models| package(&models));
     for (name, scene, packages, build) in crate::bench::rolling_graphs(packages.as_deref()) {
-        let (graph, plans) = (folder.join(format!("{name}.roadmap")), folder.join(name).join("plans"));
+        // Plans of another graph, and replays of these, do not count.
+        let own = folder.join(name);
+        if own.is_dir() {
+            fs::remove_dir_all(&own).map_err(|error| format!("{}: {error}", own.display()))?;
+        }
+        let (graph, plans) = (folder.join(format!("{name}.roadmap")), own.join("plans"));
         let (graph, plans) = (graph.display(), plans.display());
         regrasp_with(&program, &format!("roadmap build scenes/{scene}.toml {packages} -o {graph} {build}"))?;
         regrasp_with(
@@ -114,7 +119,7 @@ pub fn roadmaps(_: &[String]) -> Outcome {
                 "roadmap bench {graph} scenes/{scene}.toml {packages} --queries {queries} --single {queries} --plans {plans}"
             ),
         )?;
-        let part = folder.join(name).join("replays");
+        let part = own.join("replays");
         campaign(&format!(
             "scenes/{scene}.toml {packages} --gravity plan --made {plans} --controllers B,C2 --seeds {queries} -o {} --name {name}",
             part.display()

@@ -21,19 +21,21 @@ pub const METHOD: &str = "roadmap";
 
 /// Answers queries, one right after the other as a user of a graph asks them; plans the first `n_single` of them without the
 /// graph; then judges the plans and measures both. Times are of the query alone: the roadmap is open. `keep` is given each plan with
-/// its row, before it is judged; one of the graph has the method [`METHOD`].
+/// what was asked and its row, before it is judged; one of the graph has the method [`METHOD`].
 pub fn run(
     planner: &RoadmapPlanner,
     problems: &[Problem],
     n_single: usize,
     settings: &RunSettings,
     memory: &mut QueryMemory,
-    keep: &mut dyn FnMut(&Row, &Plan),
+    keep: &mut dyn FnMut(Problem, &Row, &Plan),
 ) -> Vec<Row> {
     let answers: Vec<_> = problems.iter().map(|&problem| answer(planner, problem, settings, memory)).collect();
     let singles: Vec<_> = problems.iter().take(n_single).map(|&problem| plan_only(problem, settings)).collect();
-    for (row, plan) in answers.iter().chain(&singles) {
-        plan.iter().for_each(|plan| keep(row, plan));
+    for planned in [&answers, &singles] {
+        for (&problem, (row, plan)) in problems.iter().zip(planned) {
+            plan.iter().for_each(|plan| keep(problem, row, plan));
+        }
     }
     let mut singles = singles.into_iter();
     let mut rows = Vec::with_capacity(2 * problems.len());

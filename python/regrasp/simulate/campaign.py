@@ -91,10 +91,18 @@ class Job:
 
 def run(job: Job) -> list[dict[str, Any]]:
     """Plans, unless the plan is there, and replays what has no result yet; returns a row per controller."""
-    missing = [controller for controller in job.controllers if not job.result_path(controller).exists()]
+    missing = [controller for controller in job.controllers if not _is_done(job, controller)]
     if missing:
         _replay(job, missing)
     return [json.loads(job.result_path(controller).read_text()) for controller in job.controllers]
+
+
+def _is_done(job: Job, controller: str) -> bool:
+    """True where a result is there, and no plan that was written since."""
+    result = job.result_path(controller)
+    is_there = result.exists()
+    is_newer = is_there and job.plan_path.exists() and job.plan_path.stat().st_mtime_ns > result.stat().st_mtime_ns
+    return is_there and not is_newer
 
 
 def _replay(job: Job, controllers: Sequence[str]) -> None:
@@ -334,7 +342,7 @@ def main(arguments: list[str] | None = None) -> int:
     options.output.mkdir(parents=True, exist_ok=True)
     made_with = options.output / "settings.json"
     if made_with.exists() and json.loads(made_with.read_text()) != settings:
-        print(f"error: the plans in {options.output} are others ({made_with})", file=sys.stderr)
+        print(f"error: {options.output} has replays of plans with other --settings or from another --made ({made_with})", file=sys.stderr)
         return 2
     _write(made_with, json.dumps(settings))
     jobs = [

@@ -21,7 +21,7 @@ use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::roadmap::{
     About, BuildSettings, BuildStage, Census, GraspRoadmap, QueryMemory, Region, RoadmapPlanner, build_roadmap,
 };
-use regrasp::planners::in_hand::{FirstTry, InHandSettings, TransferMode};
+use regrasp::planners::in_hand::{InHandSettings, TransferMode};
 use regrasp::{Budget, InHandQuery, Query};
 use regrasp_bench::row::{Judge, Row};
 use regrasp_bench::{Problem, RunSettings, csv, roadmap as bench, summarise, summary};
@@ -104,10 +104,11 @@ fn run_build(arguments: &args::RoadmapBuild, common: &Common, talk: &Talk) -> Re
         })
     };
     // Settings of a file are whole: a margin that it leaves out is the usual one.
-    if arguments.margin.is_some() || arguments.settings.is_some() {
-        return save(&build(&settings)?, &arguments.output, talk);
-    }
-    save(&careful_if_possible(&settings, build, talk)?, &arguments.output, talk)
+    let roadmap = match (&settings.search.first_try, arguments.margin, &arguments.settings) {
+        (Some(first), None, None) => careful_if_possible(&settings, first.closure_margin, build, talk)?,
+        _ => build(&settings)?,
+    };
+    save(&roadmap, &arguments.output, talk)
 }
 
 /// Share of its places that a graph should connect.
@@ -117,6 +118,7 @@ const COVERED: f64 = 0.95;
 /// single plans do (docs/how-to/many-queries.md). Where it connects few of its places, one with the usual margin, if that connects more.
 fn careful_if_possible(
     settings: &InHandSettings,
+    first_margin: f64,
     build: impl Fn(&InHandSettings) -> Result<GraspRoadmap, Stop>,
     talk: &Talk,
 ) -> Result<GraspRoadmap, Stop> {
@@ -126,20 +128,20 @@ fn careful_if_possible(
     };
     let usual = settings.physics.closure_margin;
     let mut careful = settings.clone();
-    careful.physics.closure_margin = FirstTry::default().closure_margin.max(usual);
-    let why = match build(&careful) {
+    careful.physics.closure_margin = first_margin.max(usual);
+    let first = match build(&careful) {
         Ok(roadmap) if covered(&roadmap) >= COVERED => return Ok(roadmap),
         Ok(roadmap) => Ok(roadmap),
         Err(Stop::NoPlan(failure)) => Err(failure),
         Err(stop) => return Err(stop),
     };
-    let (kept, share) = (careful.physics.closure_margin, why.as_ref().map_or(0.0, covered));
+    let (kept, share) = (careful.physics.closure_margin, first.as_ref().map_or(0.0, covered));
     talk.say(format!(
         "build  with a closure margin of {kept} only {:.0} % of the places are connected: again with {usual}",
         100.0 * share
     ));
     talk.event("again", json!({ "closure_margin": kept, "covered": share, "next_closure_margin": usual }));
-    match (build(settings), why) {
+    match (build(settings), first) {
         (Ok(roadmap), Ok(careful)) if covered(&roadmap) <= covered(&careful) => Ok(careful),
         (Err(Stop::NoPlan(_)), Ok(careful)) => Ok(careful),
         (result, _) => result,
@@ -371,20 +373,20 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
     };
     let mut memory = QueryMemory::default();
     let mut rows = Vec::new();
-    let mut unwritable = None;
     let seeds: Vec<u64> = (0..arguments.queries).map(|number| arguments.first_seed.saturating_add(number)).collect();
     let mut n_single = usize::try_from(arguments.single).unwrap_or(usize::MAX);
     for block in seeds.chunks(bench::BLOCK) {
         let queries: Vec<_> = block.iter().map(|&seed| Query::from(planner.random_query(seed))).collect();
         let problem = |(query, &seed)| Problem { task: loaded.manipulation(), query, seed };
         let problems: Vec<Problem> = queries.iter().zip(block).map(problem).collect();
-        let mut keep = |row: &Row, plan: &Plan| {
-            let query = problems.iter().find(|problem| problem.seed == row.seed).map(|problem| problem.query);
-            if let (Some(folder), Some(query), None) = (&arguments.plans, query, &unwritable) {
-                unwritable = write_plan(folder, row, query, plan).err();
+        let mut kept = Ok(());
+        let mut keep = |problem: Problem, row: &Row, plan: &Plan| {
+            if let (Some(folder), Ok(())) = (&arguments.plans, &kept) {
+                kept = write_plan(folder, row, problem.query, plan);
             }
         };
         let found = bench::run(&planner, &problems, n_single, &settings, &mut memory, &mut keep);
+        kept?;
         n_single = n_single.saturating_sub(block.len());
         if cancelled.load(Ordering::Relaxed) {
             return Err(Stop::Interrupted);
@@ -396,9 +398,6 @@ fn run_bench(arguments: &args::RoadmapBench, common: &Common, talk: &Talk) -> Re
             }
             rows.push(row);
         }
-    }
-    if let Some(stop) = unwritable {
-        return Err(stop);
     }
     if let (Some(writer), Some(path)) = (writer, &arguments.csv) {
         writer.finish().map_err(|error| Stop::unwritable(path, &error))?;
