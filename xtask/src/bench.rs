@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 const RESULTS: &str = "docs/benchmarks";
 /// Sections of the page, in this order; those without a CSV file are left out.
-const SECTIONS: [&str; 17] = [
+const SECTIONS: [&str; 18] = [
     "rolling_wide",
     "rolling_allegro",
     "wide",
@@ -25,6 +25,7 @@ const SECTIONS: [&str; 17] = [
     "roadmap_rolling_sphere",
     "roadmap_rolling_box",
     "roadmap_rolling_allegro_sphere",
+    "roadmap_rolling_allegro_cube",
 ];
 const GROWTH: &str = "fingers triangles obstacles threads";
 /// Raw rows above this size are kept compressed.
@@ -133,8 +134,18 @@ pub fn rolling_graphs(
     own.into_iter().chain(allegro)
 }
 
-/// Random queries on saved graphs, and the same ones without them; `out/roadmaps` keeps the graphs.
-pub fn roadmaps(_: &[String]) -> Outcome {
+/// Those of `all` that have one of `names`, or all of them where there are no `names`. A name that none of them has is an error.
+pub fn named<T>(all: Vec<T>, names: &[String], name_of: impl Fn(&T) -> &str) -> Result<Vec<T>, String> {
+    let known: Vec<&str> = all.iter().map(&name_of).collect();
+    if let Some(unknown) = names.iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(format!("there is no {unknown:?}; there are {}", known.join(", ")));
+    }
+    let is_asked = |one: &T| names.is_empty() || names.iter().any(|name| name == name_of(one));
+    Ok(all.into_iter().filter(is_asked).collect())
+}
+
+/// Random queries on the saved graphs of these names, or all, and the same queries without them; `out/roadmaps` keeps the graphs.
+pub fn roadmaps(names: &[String]) -> Outcome {
     let program = regrasp()?;
     unpack()?;
     let folder = out("roadmaps")?;
@@ -149,7 +160,7 @@ pub fn roadmaps(_: &[String]) -> Outcome {
     ];
     let rolling = rolling_graphs(packages.as_deref());
     runs.extend(rolling.map(|(name, scene, packages, build)| (name, scene, packages, "", build, queries / 10)));
-    for (name, scene, packages, settings, build, single) in runs {
+    for (name, scene, packages, settings, build, single) in named(runs, names, |run| run.0)? {
         let graph = folder.join(format!("{name}.roadmap"));
         let graph = graph.display();
         regrasp_with(&program, &format!("roadmap build scenes/{scene}.toml {packages} {settings} -o {graph} {build}"))?;
@@ -347,6 +358,17 @@ mod tests {
         fs::File::options().write(true).open(&archive).unwrap().set_modified(later).unwrap();
         assert!(is_newest(&archive), "as old as the rows that it was unpacked to");
         fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn names_choose_and_unknown_ones_are_refused() {
+        let asked = |names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
+            named(vec![("a", 1), ("b", 2), ("c", 3)], &names, |one| one.0)
+        };
+        assert_eq!(asked(&[]).unwrap(), [("a", 1), ("b", 2), ("c", 3)]);
+        assert_eq!(asked(&["c", "a"]).unwrap(), [("a", 1), ("c", 3)]);
+        assert_eq!(asked(&["a", "d"]).unwrap_err(), "there is no \"d\"; there are a, b, c");
     }
 
     #[test]

@@ -97,14 +97,15 @@ pub fn tracking(_: &[String]) -> Outcome {
     Ok(())
 }
 
-/// Random queries of roadmaps with the defaults, replayed beside the same queries planned without the graph.
-pub fn roadmaps(_: &[String]) -> Outcome {
+/// Random queries of the roadmaps of these names, or all, with the defaults, replayed beside the same queries planned without the graph.
+pub fn roadmaps(names: &[String]) -> Outcome {
     needs_python()?;
     let program = regrasp()?;
     let folder = out("replay-roadmap")?;
     let queries = number("ROADMAP_QUERIES", 50)?;
     let packages = models().map(|models| package(&models));
-    for (name, scene, packages, build) in crate::bench::rolling_graphs(packages.as_deref()) {
+    let graphs = crate::bench::rolling_graphs(packages.as_deref()).collect();
+    for (name, scene, packages, build) in crate::bench::named(graphs, names, |graph| graph.0)? {
         // Plans of another graph, and replays of these, do not count.
         let own = folder.join(name);
         if own.is_dir() {

@@ -6,6 +6,7 @@ mod quick;
 pub use quick::convex_hull;
 
 use crate::frame::{Point, Vector};
+use crate::shape::ball_of;
 
 /// A convex polyhedron. Every point it was built from lies inside it within `1e-9` of its size.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +16,10 @@ pub struct ConvexHull {
     /// Neighbours of vertex `i` are `neighbours[starts[i]..starts[i + 1]]`.
     starts: Vec<u32>,
     neighbours: Vec<u32>,
+    /// Center and radius of a ball that contains it.
+    ball: (Point, f64),
+    /// A vertex to start from for every direction; see [`guess_cell`]. Empty where all vertices are looked at.
+    guesses: Vec<u32>,
 }
 
 /// Why points have no hull with an inside.
@@ -36,6 +41,9 @@ pub enum HullError {
 
 /// Below this many vertices the support is found by looking at all of them.
 const BRUTE_FORCE_LIMIT: usize = 24;
+
+/// Cells along each side of the six faces of a cube of directions.
+const GUESS_CELLS: usize = 8;
 
 /// Up to this many points [`ConvexHull::new`] is exact.
 const EXACT_UP_TO: usize = 20_000;
@@ -117,12 +125,31 @@ impl ConvexHull {
             neighbours.extend_from_slice(list);
             starts.push(neighbours.len() as u32);
         }
-        Ok(ConvexHull { vertices, triangles, starts, neighbours })
+        let ball = ball_of(&vertices);
+        let mut hull = ConvexHull { vertices, triangles, starts, neighbours, ball, guesses: Vec::new() };
+        hull.set_guesses();
+        Ok(hull)
     }
 
     /// The same polyhedron with every corner moved by one rigid motion, `place`.
     pub fn moved(&self, place: impl Fn(&Point) -> Point) -> Self {
-        ConvexHull { vertices: self.vertices.iter().map(place).collect(), ..self.clone() }
+        let vertices: Vec<Point> = self.vertices.iter().map(place).collect();
+        let mut moved = ConvexHull { ball: ball_of(&vertices), vertices, ..self.clone() };
+        moved.set_guesses();
+        moved
+    }
+
+    /// Looks up the vertices to start from.
+    fn set_guesses(&mut self) {
+        if self.vertices.len() <= BRUTE_FORCE_LIMIT {
+            return;
+        }
+        let mut vertex = 0;
+        let farthest = |direction: Vector| {
+            self.support(&direction, &mut vertex);
+            vertex
+        };
+        self.guesses = guess_directions().map(farthest).collect();
     }
 
     /// The vertices, in the hull's frame.
@@ -130,12 +157,18 @@ impl ConvexHull {
         &self.vertices
     }
 
+    /// Center and radius of a ball that contains it, in the hull's frame.
+    pub fn ball(&self) -> (Point, f64) {
+        self.ball
+    }
+
     /// Outward triangles.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// The vertex farthest along `direction`, found by walking the edges uphill from `hint`.
+    /// The vertex farthest along `direction`, found by walking the edges uphill: from a vertex in a table, or from `hint`, the answer
+    /// to an earlier direction (or any number), where that is higher.
     pub fn support(&self, direction: &Vector, hint: &mut u32) -> Point {
         if self.vertices.len() <= BRUTE_FORCE_LIMIT {
             let mut best = self.vertices[0];
@@ -148,8 +181,13 @@ impl ConvexHull {
             }
             return best;
         }
-        let mut current = (*hint as usize).min(self.vertices.len() - 1);
-        let mut current_value = direction.dot(&self.vertices[current].coords);
+        let value_at = |vertex: usize| direction.dot(&self.vertices[vertex].coords);
+        let mut current = self.guesses.get(guess_cell(direction)).map_or(0, |&guess| guess as usize);
+        let mut current_value = value_at(current);
+        // An answer to another direction is better where that was near.
+        if (*hint as usize) < self.vertices.len() && value_at(*hint as usize) > current_value {
+            (current, current_value) = (*hint as usize, value_at(*hint as usize));
+        }
         loop {
             let mut next = current;
             for &neighbour in &self.neighbours[self.starts[current] as usize..self.starts[current + 1] as usize] {
@@ -165,6 +203,31 @@ impl ConvexHull {
             current = next;
         }
     }
+}
+
+/// Which cell of a cube `direction` goes through: its face (largest component and the sign of that), then rows and columns of cells.
+#[inline]
+fn guess_cell(direction: &Vector) -> usize {
+    let axis = direction.iamax();
+    let largest = direction[axis].abs();
+    // A direction of length zero, or of no number, gets some cell: any vertex is as good.
+    let cell = |value: f64| ((value / largest + 1.0) * (GUESS_CELLS as f64 / 2.0)) as usize;
+    let [row, column] = [1, 2].map(|k| cell(direction[(axis + k) % 3]).min(GUESS_CELLS - 1));
+    ((2 * axis + usize::from(direction[axis] > 0.0)) * GUESS_CELLS + row) * GUESS_CELLS + column
+}
+
+/// The directions through the middles of the cells, in the order of [`guess_cell`].
+fn guess_directions() -> impl Iterator<Item = Vector> {
+    let middle = |k: usize| (2 * k + 1) as f64 / GUESS_CELLS as f64 - 1.0;
+    (0..6 * GUESS_CELLS * GUESS_CELLS).map(move |i| {
+        let (face, row, column) = (i / (GUESS_CELLS * GUESS_CELLS), i / GUESS_CELLS % GUESS_CELLS, i % GUESS_CELLS);
+        let axis = face / 2;
+        let mut direction = Vector::zeros();
+        direction[axis] = if face % 2 == 1 { 1.0 } else { -1.0 };
+        direction[(axis + 1) % 3] = middle(row);
+        direction[(axis + 2) % 3] = middle(column);
+        direction
+    })
 }
 
 /// A corner and the unit normal of a triangle; None when it has no area beside `size` squared.
@@ -306,6 +369,45 @@ mod tests {
         }
         let flat: Vec<Point> = cloud(100, 20).into_iter().map(|p| Point::new(p.x, p.y, 0.0)).collect();
         assert!(matches!(ConvexHull::around(&flat), Err(HullError::Flat { .. })));
+    }
+
+    #[test]
+    fn the_support_is_the_farthest_vertex_with_any_hint() {
+        let mut rng = Rng::keyed(3, "hull", 0);
+        let turned = |p: &Point| Point::new(p.y + 0.3, p.z - 0.1, p.x);
+        for (index, n) in [100, 300, 5000].into_iter().enumerate() {
+            let hull = ConvexHull::new(&cloud(n, 40 + index as u64)).unwrap();
+            assert!(hull.vertices().len() > BRUTE_FORCE_LIMIT);
+            for hull in [hull.moved(turned), hull] {
+                for (cell, direction) in guess_directions().enumerate() {
+                    assert_eq!(guess_cell(&direction), cell);
+                }
+                for k in 0..600 {
+                    let axis = Vector::ith(k % 3, if k % 2 == 0 { 1.0 } else { -1.0 });
+                    let direction =
+                        if k < 6 { axis } else { Vector::from(rng.direction()) * 10f64.powi(k as i32 % 40 - 20) };
+                    let all =
+                        hull.vertices().iter().map(|v| direction.dot(&v.coords)).fold(f64::NEG_INFINITY, f64::max);
+                    for start in [u32::MAX, 0, rng.below(hull.vertices().len()) as u32] {
+                        let mut hint = start;
+                        let found = hull.support(&direction, &mut hint);
+                        assert!(
+                            (direction.dot(&found.coords) - all).abs() <= 1e-14 * direction.norm(),
+                            "{direction} {start}"
+                        );
+                        assert_eq!(hull.vertices()[hint as usize], found);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_direction_that_is_none_gets_some_vertex() {
+        let hull = ConvexHull::new(&cloud(300, 50)).unwrap();
+        for odd in [Vector::zeros(), Vector::repeat(f64::NAN), Vector::repeat(f64::INFINITY)] {
+            assert!(hull.vertices().contains(&hull.support(&odd, &mut 0)));
+        }
     }
 
     #[test]

@@ -70,7 +70,7 @@ impl Shape {
             Shape::Cuboid { half_extents } => (Point::origin(), half_extents.norm()),
             Shape::Cylinder { half_length, radius } => (Point::origin(), half_length.hypot(*radius)),
             Shape::Ellipsoid { radii } => (Point::origin(), radii.max()),
-            Shape::Convex(hull) => ball_of(hull.vertices()),
+            Shape::Convex(hull) => hull.ball(),
             Shape::Mesh(mesh) => ball_of(mesh.vertices()),
         }
     }
@@ -122,7 +122,7 @@ fn bounds_of(points: &[Point]) -> (Point, Point) {
     points.iter().fold((points[0], points[0]), |(low, high), p| (low.inf(p), high.sup(p)))
 }
 
-fn ball_of(points: &[Point]) -> (Point, f64) {
+pub(crate) fn ball_of(points: &[Point]) -> (Point, f64) {
     let (low, high) = bounds_of(points);
     let center = nalgebra::center(&low, &high);
     (center, points.iter().map(|p| (p - center).norm()).fold(0.0, f64::max))

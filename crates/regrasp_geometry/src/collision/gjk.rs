@@ -59,10 +59,15 @@ pub fn separation(
     )
 }
 
-/// [`separation`] of a placed convex shape from the hull of a few points of the same parent.
-pub fn separation_from_points(a: &Shape, parent_from_a: &Placement, points: &[Point], required: f64) -> Separation {
+/// [`separation`] of a placed convex shape from the hull of a few points of the same parent, with `direction` to start from.
+pub fn separation_from_points(
+    a: &Shape,
+    parent_from_a: &Placement,
+    points: &[Point],
+    required: f64,
+    mut direction: Vector,
+) -> Separation {
     let mut hint = 0;
-    let mut direction = points[0].coords - parent_from_a.translation;
     search(
         |v| parent_from_a.point(&core_support(a, &parent_from_a.vector_to_child(v), &mut hint)),
         |v| {

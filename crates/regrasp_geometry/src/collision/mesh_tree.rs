@@ -4,7 +4,7 @@
 //! triangles is wholly inside or wholly outside, so that one point of it is asked. Along a motion that stays apart from
 //! the triangles one moment is enough.
 
-use super::gjk::{Placed, Separation, separation};
+use super::gjk::{Placed, Separation, separation, separation_from_points};
 use super::placement::Placement;
 use super::support::support_value;
 use super::winding::{self, Dipole};
@@ -165,7 +165,7 @@ impl MeshTree {
             }
             // Of a ball the distance is known already.
             if !matches!(shape, Shape::Sphere { .. })
-                && let Separation::SeparatedBy(d) = box_separation(shape, mesh_from_shape, node, required)
+                && let Separation::SeparatedBy(d) = box_separation(shape, mesh_from_shape, node, required, &center)
             {
                 *smallest = smallest.min(d);
                 continue;
@@ -177,7 +177,7 @@ impl MeshTree {
                 continue;
             }
             for corners in self.corners_of(node) {
-                match triangle_separation(shape, mesh_from_shape, corners, required) {
+                match triangle_separation(shape, mesh_from_shape, corners, required, &center) {
                     Separation::SeparatedBy(d) => *smallest = smallest.min(d),
                     _ => return false,
                 }
@@ -232,7 +232,10 @@ impl MeshTree {
                 {
                     continue;
                 }
-                if !matches!(triangle_separation(shape, mesh_from_shape, corners, 0.0), Separation::SeparatedBy(_)) {
+                if !matches!(
+                    triangle_separation(shape, mesh_from_shape, corners, 0.0, &center),
+                    Separation::SeparatedBy(_)
+                ) {
                     return false;
                 }
             }
@@ -256,12 +259,21 @@ pub struct HalfSpace {
     pub level: f64,
 }
 
-/// Separation of a convex shape from the box of a node, both in the mesh frame.
-fn box_separation(shape: &Shape, mesh_from_shape: &Placement, node: &Node, required: f64) -> Separation {
+/// Separation of a convex shape from the box of a node, both in the mesh frame. The search starts along the way from `center`, the
+/// middle of the shape, to what is nearest to it: of round shapes that is nearly the direction sought.
+fn box_separation(
+    shape: &Shape,
+    mesh_from_shape: &Placement,
+    node: &Node,
+    required: f64,
+    center: &Point,
+) -> Separation {
     let at_box =
         Placement { rotation: Matrix3::identity(), translation: nalgebra::center(&node.low, &node.high).coords };
     let cuboid = Shape::Cuboid { half_extents: (node.high - node.low) / 2.0 };
-    let mut direction = at_box.translation - mesh_from_shape.translation;
+    let nearest = center.sup(&node.low).inf(&node.high);
+    // In the box there is no such way: `separation` goes from one middle to the other then.
+    let mut direction = nearest - center;
     separation(
         Placed { shape, at: mesh_from_shape },
         Placed { shape: &cuboid, at: &at_box },
@@ -282,9 +294,17 @@ fn box_distance(low: &Point, high: &Point, point: &Point) -> f64 {
     squared.sqrt()
 }
 
-/// Separation of a convex shape from one triangle, both in the mesh frame.
-fn triangle_separation(shape: &Shape, mesh_from_shape: &Placement, corners: &[Point; 3], required: f64) -> Separation {
-    super::gjk::separation_from_points(shape, mesh_from_shape, corners, required)
+/// As [`box_separation`], from one triangle.
+fn triangle_separation(
+    shape: &Shape,
+    mesh_from_shape: &Placement,
+    corners: &[Point; 3],
+    required: f64,
+    center: &Point,
+) -> Separation {
+    let nearest = nearest_on_triangle(corners, center).0 - center;
+    let direction = if nearest.norm_squared() > 1e-30 { nearest } else { corners[0] - center };
+    separation_from_points(shape, mesh_from_shape, corners, required, direction)
 }
 
 fn build(corners: &mut [[Point; 3]], first: usize, nodes: &mut Vec<Node>, dipoles: &mut Vec<Dipole>) -> u32 {
@@ -349,8 +369,10 @@ mod tests {
                 let below = HalfSpace { normal, level: lowest + rng.uniform(0.0, 0.1) };
                 let expected = tree.corners.iter().all(|corners| {
                     let highest = corners.iter().map(|p| normal.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
-                    matches!(triangle_separation(&shape, &at, corners, 0.0), Separation::SeparatedBy(_))
-                        || highest <= below.level
+                    matches!(
+                        triangle_separation(&shape, &at, corners, 0.0, &at.point(&center)),
+                        Separation::SeparatedBy(_)
+                    ) || highest <= below.level
                 });
                 assert_eq!(tree.meets_only_below(&shape, (&center, radius), &at, &below), expected);
                 n_of[usize::from(expected)] += 1;
