@@ -172,13 +172,13 @@ impl<'a> Between<'a> {
         pose_between(start, end, self.sigma.at(u))
     }
 
-    /// When `sigma` is one half: half-way for the object and the forces.
-    pub fn half_way(&self) -> f64 {
+    /// When `sigma` is `share`: so much of the way of the object and of the change of the forces is made by then.
+    pub fn when(&self, share: f64) -> f64 {
         let (mut low, mut high) = (0.0, 1.0);
         // As many halvings as a double has digits.
         for _ in 0..54 {
             let middle = 0.5 * (low + high);
-            match self.sigma.at(middle) < 0.5 {
+            match self.sigma.at(middle) < share {
                 true => low = middle,
                 false => high = middle,
             }

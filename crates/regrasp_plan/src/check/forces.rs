@@ -124,7 +124,7 @@ pub fn check_forces(
             }
         }
         for w in 1..segment.waypoints.len() {
-            let half_way = judge.check_half_way(segment, Moment::at(s, w - 1), log);
+            let half_way = judge.check_between(segment, Moment::at(s, w - 1), log);
             balance.half_way = balance.half_way.max(half_way);
         }
     }
@@ -385,44 +385,67 @@ impl Judge<'_> {
         }
     }
 
-    /// What is left half-way from a waypoint to the next, as a share of the sum of all normal forces.
-    fn check_half_way(&self, segment: &Segment, at: Moment, log: &mut Log) -> f64 {
+    /// What is left between a waypoint and the next, as a share of the sum of all normal forces: half-way, and at more moments where
+    /// contacts travel far.
+    fn check_between(&self, segment: &Segment, at: Moment, log: &mut Log) -> f64 {
         let (from, to) = (&segment.waypoints[at.waypoint], &segment.waypoints[at.waypoint + 1]);
         let motion = Between::new(from, to);
-        let half_way = motion.half_way();
+        let travel =
+            |(before, after)| Some((contact_of(after)?.point_in_object - contact_of(before)?.point_in_object).norm());
+        let travels_far = from.contacts.iter().zip(&to.contacts).filter_map(travel).any(|travel| travel > FAR_TRAVEL);
+        let shares: &[f64] = if travels_far { &[0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875] } else { &[0.5] };
+        shares.iter().map(|&share| self.check_when(&motion, (from, to), share, at, log)).fold(0.0, f64::max)
+    }
+
+    /// What is left when `share` of the way from a waypoint to the next is made.
+    fn check_when(
+        &self,
+        motion: &Between,
+        (from, to): (&Waypoint, &Waypoint),
+        share: f64,
+        at: Moment,
+        log: &mut Log,
+    ) -> f64 {
+        let moment_between = motion.when(share);
         let mut exerted = Vec::new();
         for (f, (before, after)) in from.contacts.iter().zip(&to.contacts).enumerate() {
             let (Some(first), Some(second)) = (contact_of(before), contact_of(after)) else { continue };
-            let mean = |a: Option<[f64; 3]>, b: Option<[f64; 3]>| Some((Vector::from(a?) + Vector::from(b?)) * 0.5);
-            let Some(force) = mean(before.force_in_object, after.force_in_object) else { return 0.0 };
-            let torsion = 0.5 * (before.torsion.unwrap_or(0.0) + after.torsion.unwrap_or(0.0));
+            let mix = |a: Option<[f64; 3]>, b: Option<[f64; 3]>| Some(Vector::from(a?).lerp(&Vector::from(b?), share));
+            let Some(force) = mix(before.force_in_object, after.force_in_object) else { return 0.0 };
+            let torsion = (1.0 - share) * before.torsion.unwrap_or(0.0) + share * after.torsion.unwrap_or(0.0);
             let (point, normal) = if first == second {
                 (first.point_in_object, first.normal_in_object.into_inner())
             } else {
                 let tolerance = self.plan.promises.contact_tolerance;
                 let roll = Roll::new((f, &self.model.fingers[f]), from, to, &self.model.shape, tolerance);
-                let Some(contact) = roll.contact(half_way) else { continue };
+                let Some(contact) = roll.contact(moment_between) else { continue };
                 contact
             };
             exerted.push(Exerted { finger: f, point, normal, force, torsion, slides: None });
         }
         let pressing: f64 = exerted.iter().map(Exerted::pressing).sum();
-        let (force, moment) = self.residual(&motion.object_at(half_way), &exerted);
+        let (force, moment) = self.residual(&motion.object_at(moment_between), &exerted);
         // Fingers that do not press leave room for no imbalance, and nothing is divided by zero.
-        let share = force.norm().hypot(moment.norm() / self.object.radius) / pressing.max(1e-9);
+        let left = force.norm().hypot(moment.norm() / self.object.radius) / pressing.max(1e-9);
         let limit = self.settings.half_way_imbalance;
-        if share > limit {
+        if left > limit {
+            let when = if share == 0.5 { "half-way".to_owned() } else { format!("{share} of the way") };
             let message = format!(
-                "half-way to the next waypoint forces and weight leave {:.3e} N and {:.3e} N m",
+                "{when} to the next waypoint forces and weight leave {:.3e} N and {:.3e} N m",
                 force.norm(),
                 moment.norm()
             );
-            let violation = Violation::new(Kind::ForceUnbalanced, message).when(Moment { fraction: half_way, ..at });
-            log.push(violation.subjects(["object"]).amount(share, limit));
+            let violation =
+                Violation::new(Kind::ForceUnbalanced, message).when(Moment { fraction: moment_between, ..at });
+            log.push(violation.subjects(["object"]).amount(left, limit));
         }
-        share
+        left
     }
 }
+
+/// Way of a contact over the object from one waypoint to the next, in metres, from which on it is looked at in more moments than half-way.
+/// A flat pad that tips over sweeps over its whole width between two of them.
+const FAR_TRAVEL: f64 = 2e-3;
 
 /// Where a fingertip slides by its relative velocity, across `normal`: a unit vector, or zero without one; none in modes
 /// that do not slide.

@@ -9,6 +9,7 @@ mod free_fingers;
 mod improvement;
 mod in_hand_methods;
 mod leap;
+mod pads;
 mod physics;
 #[path = "../../../../tests/support/places.rs"]
 mod places;

@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::frame::PoseLine;
-use regrasp_geometry::{Pose, frame};
+use regrasp_geometry::{Point, Pose, frame};
 use regrasp_grasp::Contact;
 use regrasp_manipulation::grasp::state::{HandJoints, MAX_FINGERS, Moment};
 use regrasp_manipulation::model::Model;
@@ -49,6 +49,10 @@ pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> R
             if model.restricts_motion(finger) {
                 spins.push(rolled.spin);
             }
+            let ends = [contacts[finger].point_in_object, rolled.contact.point_in_object];
+            if !travels_evenly(ends, rolled.halfway.as_ref()) {
+                return Err(NoStep::TooLong);
+            }
             contacts[finger] = rolled.contact;
             halfway[finger] = rolled.halfway.unwrap_or(rolled.contact);
             rolled.joints
@@ -65,6 +69,17 @@ pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> R
         return Err(NoStep::TooLong);
     }
     Ok((Moment { world_from_object: *pose, joints, contacts }, spins))
+}
+
+/// Longest way of a contact over the object in one step, in metres, and how far it may be half-way from the middle between its ends.
+const TRAVEL: (f64, f64) = (8e-3, 1e-3);
+
+/// True unless a contact sweeps too far over the object in a step. Forces change evenly from one waypoint to the next: where a flat pad tips
+/// over, and its contact goes from one rim to the other within a degree or two, they balance at both ends and not between.
+fn travels_evenly([from, to]: [Point; 2], halfway: Option<&Contact>) -> bool {
+    let (longest, uneven) = TRAVEL;
+    let is_near = |halfway: &Contact| (halfway.point_in_object - nalgebra::center(&from, &to)).norm() <= uneven;
+    (to - from).norm() <= longest && halfway.is_none_or(is_near)
 }
 
 /// How far a tip may stray from its contact half-way, in metres: a share of the tolerance; the rest is for what lies between.
