@@ -60,7 +60,7 @@ impl Turn {
 pub fn primitive(text: &str) -> Option<Result<Table, String>> {
     let (kind, rest) = text.split_once(':')?;
     let (_, form) = PRIMITIVES.iter().find(|(name, _)| *name == kind)?;
-    let wrong = || format!("expected {form}, in metres");
+    let wrong = || format!("{form}, in metres");
     let mut inside = Table::new();
     match (kind, numbers(rest).as_deref()) {
         ("sphere", Some([radius])) => {

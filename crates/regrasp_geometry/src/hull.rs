@@ -6,7 +6,6 @@ mod quick;
 pub use quick::convex_hull;
 
 use crate::frame::{Point, Vector};
-use crate::shape::ball_of;
 
 /// A convex polyhedron. Every point it was built from lies inside it within `1e-9` of its size.
 #[derive(Debug, Clone, PartialEq)]
@@ -228,6 +227,13 @@ fn guess_directions() -> impl Iterator<Item = Vector> {
         direction[(axis + 2) % 3] = middle(column);
         direction
     })
+}
+
+/// Center and radius of a ball that contains the points, about the middle of their bounds. Panics where there are none.
+pub(crate) fn ball_of(points: &[Point]) -> (Point, f64) {
+    let (low, high) = points.iter().fold((points[0], points[0]), |(low, high), p| (low.inf(p), high.sup(p)));
+    let center = nalgebra::center(&low, &high);
+    (center, points.iter().map(|p| (p - center).norm()).fold(0.0, f64::max))
 }
 
 /// A corner and the unit normal of a triangle; None when it has no area beside `size` squared.

@@ -1,6 +1,10 @@
 //! Triangle meshes as read, validated, with their statistics.
 
 use crate::frame::{Point, Vector};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Corners along rims that are this share of the mesh's size apart are one: files have six to nine digits.
+const WELD: f64 = 1e-6;
 
 /// A triangle mesh with finite vertices, indices in range and no triangle of zero area.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +21,10 @@ pub struct MeshStatistics {
     pub zero_area_dropped: usize,
     /// Vertices at the same position that were merged into another.
     pub vertices_merged: usize,
+    /// Vertices of a mesh that was not closed that were merged into another nearby, within rounding errors of files.
+    pub vertices_welded: usize,
+    /// Triangles of a mesh that was not closed that were there before, and were dropped.
+    pub duplicates_dropped: usize,
     /// Edges with one triangle: the mesh has holes when there are any.
     pub open_edges: usize,
     /// Edges with more than two triangles.
@@ -69,7 +77,9 @@ pub enum MeshError {
 }
 
 impl TriangleMesh {
-    /// Merges vertices at the same position, drops triangles of zero area and counts both.
+    /// Merges vertices at the same position, drops triangles of zero area and counts both. Where the triangles do not bound a solid, corners
+    /// along their rims that are a millionth of the mesh's size apart or less are merged too, and triangles that are there twice are kept
+    /// once, if that leaves fewer unbalanced edges.
     pub fn new(vertices: Vec<Point>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         let is_bad = |v: &Point| v.coords.iter().any(|c| !c.is_finite());
         if let Some(first) = vertices.iter().position(is_bad) {
@@ -96,7 +106,68 @@ impl TriangleMesh {
             return Err(MeshError::Empty { dropped: statistics.zero_area_dropped });
         }
         count_edges(&kept, &mut statistics);
-        Ok(TriangleMesh { vertices, triangles: kept, statistics })
+        let mesh = TriangleMesh { vertices, triangles: kept, statistics };
+        if mesh.statistics.is_closed() {
+            return Ok(mesh);
+        }
+        let welded = mesh.welded();
+        let is_better = |other: &TriangleMesh| other.statistics.unbalanced_edges < mesh.statistics.unbalanced_edges;
+        Ok(welded.filter(is_better).unwrap_or(mesh))
+    }
+
+    /// With corners along the rims that are next to each other merged, and without triangles that are there twice. None where neither is.
+    fn welded(&self) -> Option<Self> {
+        let mut statistics = MeshStatistics {
+            zero_area_dropped: self.statistics.zero_area_dropped,
+            vertices_merged: self.statistics.vertices_merged,
+            ..MeshStatistics::default()
+        };
+        let mut on_rim: Vec<u32> = rims(&self.triangles).into_iter().flatten().collect();
+        on_rim.sort_unstable();
+        on_rim.dedup();
+        let (low, high) = self.bounds();
+        let near = WELD * (high - low).norm();
+        let mut stands_for: Vec<u32> = (0..self.vertices.len() as u32).collect();
+        // The corners that stand for others, by cell of a grid whose cells are as large as what is near.
+        let mut in_cell: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
+        for corner in on_rim {
+            let at = self.vertices[corner as usize];
+            let cell = <[i64; 3]>::from(((at - low) / near).map(|x| x.floor() as i64));
+            let around = (0..27i64).map(|k| [cell[0] + k % 3 - 1, cell[1] + k / 3 % 3 - 1, cell[2] + k / 9 - 1]);
+            let nearest = around
+                .filter_map(|cell| in_cell.get(&cell))
+                .flatten()
+                .map(|&other| ((self.vertices[other as usize] - at).norm(), other))
+                .filter(|(distance, _)| *distance <= near)
+                .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            match nearest {
+                Some((_, other)) => {
+                    stands_for[corner as usize] = other;
+                    statistics.vertices_welded += 1;
+                }
+                None => in_cell.entry(cell).or_default().push(corner),
+            }
+        }
+        let mut seen = BTreeSet::new();
+        let mut kept = Vec::with_capacity(self.triangles.len());
+        for corners in &self.triangles {
+            let corners = corners.map(|i| stands_for[i as usize]);
+            let [a, b, c] = corners.map(|i| self.vertices[i as usize]);
+            // From the lowest corner on, wound as it is.
+            let lowest = (0..3).min_by_key(|&k| corners[k]).unwrap_or(0);
+            if has_no_area(&(b - a), &(c - a), &(c - b)) {
+                statistics.zero_area_dropped += 1;
+            } else if seen.insert([0, 1, 2].map(|k| corners[(lowest + k) % 3])) {
+                kept.push(corners);
+            } else {
+                statistics.duplicates_dropped += 1;
+            }
+        }
+        if kept.is_empty() || kept.len() == self.triangles.len() && statistics.vertices_welded == 0 {
+            return None;
+        }
+        count_edges(&kept, &mut statistics);
+        Some(TriangleMesh { vertices: self.vertices.clone(), triangles: kept, statistics })
     }
 
     /// The vertices, in the mesh frame.
@@ -350,6 +421,33 @@ mod tests {
         assert_eq!(flipped.statistics().flipped_edges, 3);
         assert_eq!(flipped.statistics().vertices_merged, 1);
         assert_eq!(flipped.statistics().zero_area_dropped, 1);
+    }
+
+    #[test]
+    fn seams_whose_corners_differ_by_rounding_are_closed() {
+        let (vertices, triangles) = tetrahedron();
+        for (noise, is_closed) in [(1e-17, true), (1e-9, true), (1e-7, true), (1e-4, false)] {
+            // Every triangle with corners of its own.
+            let apart = |k: usize| {
+                vertices[triangles[k / 3][k % 3] as usize] + Vector::new(1.0, -2.0, 0.5) * noise * (k / 3) as f64
+            };
+            let own: Vec<Point> = (0..12).map(apart).collect();
+            let mesh = TriangleMesh::new(own, (0..4).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect()).unwrap();
+            assert_eq!(mesh.statistics().is_closed(), is_closed, "{noise}");
+            assert_eq!(mesh.statistics().open_edges == 0, is_closed);
+            assert!((mesh.signed_volume() - 1.0 / 6.0).abs() < 1e-3);
+        }
+        // A triangle that is there twice, and one of them from another corner on.
+        let twice = [triangles.clone(), vec![[1, 3, 0], [1, 2, 3]]].concat();
+        let mesh = TriangleMesh::new(vertices.clone(), twice).unwrap();
+        assert!(mesh.statistics().is_watertight());
+        assert_eq!((mesh.statistics().duplicates_dropped, mesh.triangles().len()), (2, 4));
+        // A hole stays one, and a closed mesh whose corners are near each other stays as it is.
+        let open = TriangleMesh::new(vertices.clone(), triangles[1..].to_vec()).unwrap();
+        assert_eq!((open.statistics().open_edges, open.statistics().vertices_welded), (3, 0));
+        let mut thin = vertices.clone();
+        thin[3] = Point::new(0.0, 0.0, 1e-8);
+        assert_eq!(TriangleMesh::new(thin, triangles).unwrap().statistics().vertices_welded, 0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The shapes a link, an object or an obstacle can have.
 
 use crate::frame::{Point, Pose, Vector};
-use crate::hull::ConvexHull;
+use crate::hull::{ConvexHull, ball_of};
 use crate::mesh::TriangleMesh;
 use std::sync::Arc;
 
@@ -120,12 +120,6 @@ impl Shape {
 
 fn bounds_of(points: &[Point]) -> (Point, Point) {
     points.iter().fold((points[0], points[0]), |(low, high), p| (low.inf(p), high.sup(p)))
-}
-
-pub(crate) fn ball_of(points: &[Point]) -> (Point, f64) {
-    let (low, high) = bounds_of(points);
-    let center = nalgebra::center(&low, &high);
-    (center, points.iter().map(|p| (p - center).norm()).fold(0.0, f64::max))
 }
 
 /// A shape at a fixed place in a parent frame (a link, the object, the world).

@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
-use regrasp_grasp::{Contact, GraspFrame, Grip, closure};
+use regrasp_grasp::{Contact, ContactModel, GraspFrame, Grip, closure};
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::grasp::contact::draw_footholds;
 use regrasp_manipulation::grasp::state::MAX_FINGERS;
@@ -64,10 +64,14 @@ pub fn advise(model: &Model, ends: [&Pose; 2], seed: u64, failure: &mut Failure)
         friction_in_words(model),
         others.join(", ")
     );
-    failure.advice = format!(
-        "fingertips with more friction (friction = {}), or soft ones (contact = \"soft_finger\"); {}",
-        enough.friction, failure.advice
-    );
+    let mut advice = match enough.friction > model.view.object.friction {
+        true => format!("fingertips with more friction (friction = {})", enough.friction),
+        false => "a smaller `friction_margin` in the settings, where the scene's friction is sure".to_owned(),
+    };
+    if model.fingers.iter().any(|finger| !matches!(finger.contact, ContactModel::SoftFinger { .. })) {
+        advice += ", or soft fingertips (contact = \"soft_finger\")";
+    }
+    failure.advice = format!("{advice}; {}", failure.advice);
 }
 
 /// Number of grasps drawn, and in how many of them each finger may lift: with the friction that is planned with, then with more

@@ -325,6 +325,8 @@ fn note_statistics(mesh: &TriangleMesh, kind: &Entry, found: &mut Found) {
     let statistics = mesh.statistics();
     let counts = [
         (statistics.zero_area_dropped, "triangles of zero area were dropped"),
+        (statistics.vertices_welded, "corners of open edges were merged with others nearby"),
+        (statistics.duplicates_dropped, "triangles that are there twice were dropped"),
         (statistics.non_manifold_edges, "edges have more than two triangles"),
         (statistics.flipped_edges, "edges have triangles wound against each other"),
         (statistics.open_edges, "edges are open"),

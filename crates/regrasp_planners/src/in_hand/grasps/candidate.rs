@@ -39,6 +39,7 @@ impl Candidate {
 pub struct Way {
     from: Placement,
     moments: Vec<(Pose, Placement)>,
+    stays: bool,
 }
 
 impl Way {
@@ -50,7 +51,12 @@ impl Way {
                 (pose, Placement::from(&pose))
             })
             .collect();
-        Way { from: Placement::from(from), moments }
+        Way { from: Placement::from(from), moments, stays: from == to }
+    }
+
+    /// True where the object stays where it is.
+    pub fn stays(&self) -> bool {
+        self.stays
     }
 }
 

@@ -103,6 +103,11 @@ impl Pool {
             new.follow = Some(share);
         }
         search.workspace.place_object(&self.world_from_object);
+        if self.way.stays() {
+            // All follow as far: the newest are kept, or no other would ever be tried.
+            let n_over = footholds.len().saturating_sub(POOL_SIZE);
+            footholds.drain(..n_over);
+        }
         footholds.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
         footholds.truncate(POOL_SIZE);
         let mut order: Vec<usize> = (0..footholds.len()).collect();
