@@ -126,7 +126,11 @@ impl TriangleMesh {
         on_rim.sort_unstable();
         on_rim.dedup();
         let (low, high) = self.bounds();
-        let near = WELD * (high - low).norm();
+        let near = WELD * (high - low).amax();
+        // Meshes of sizes that no file has: distances in them are no numbers any more.
+        if !(1e-200..1e200).contains(&near) {
+            return None;
+        }
         let mut stands_for: Vec<u32> = (0..self.vertices.len() as u32).collect();
         // The corners that stand for others, by cell of a grid whose cells are as large as what is near.
         let mut in_cell: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
@@ -442,6 +446,11 @@ mod tests {
         let mesh = TriangleMesh::new(vertices.clone(), twice).unwrap();
         assert!(mesh.statistics().is_watertight());
         assert_eq!((mesh.statistics().duplicates_dropped, mesh.triangles().len()), (2, 4));
+        // Open meshes of any size are read.
+        for size in [1e-300, 1e-160, 1e160, 1e300] {
+            let open = TriangleMesh::new(vertices.iter().map(|v| v * size).collect(), triangles[1..].to_vec()).unwrap();
+            assert_eq!(open.statistics().open_edges, 3, "{size}");
+        }
         // A hole stays one, and a closed mesh whose corners are near each other stays as it is.
         let open = TriangleMesh::new(vertices.clone(), triangles[1..].to_vec()).unwrap();
         assert_eq!((open.statistics().open_edges, open.statistics().vertices_welded), (3, 0));

@@ -15,7 +15,8 @@
 //! - without a direction of gravity there is room for the weight in each (`any_gravity`).
 //!
 //! Half-way to the next waypoint, at the pose between and with contacts where tips then touch, what is left (torques over
-//! the object's radius) is at most the share `half_way_imbalance` of the sum of all normal forces.
+//! the object's radius) is at most the share `half_way_imbalance` of the sum of all normal forces. Where a contact travels far
+//! from one waypoint to the next, as under a flat pad that tips over, this is looked at in seven moments between.
 //!
 //! Between two segments pose and contacts stay and forces change linearly: what balances at both ends balances in between,
 //! and cones, largest normal forces and torque limits are convex, so that the ends are all that has to be looked at.
@@ -54,7 +55,7 @@ pub struct Balance {
     pub force: f64,
     /// Of moments at waypoints, in newton metres.
     pub moment: f64,
-    /// Half-way between waypoints, torques over the torque scale, as a share of the sum of all normal forces.
+    /// Half-way between waypoints, and where contacts travel far at more moments, torques over the torque scale, as a share of the sum of all normal forces.
     pub half_way: f64,
     /// Of the friction of sliding fingertips, as a share of friction times normal force; none when no finger slides.
     pub sliding: Option<f64>,

@@ -64,14 +64,19 @@ pub fn advise(model: &Model, ends: [&Pose; 2], seed: u64, failure: &mut Failure)
         friction_in_words(model),
         others.join(", ")
     );
-    let mut advice = match enough.friction > model.view.object.friction {
-        true => format!("fingertips with more friction (friction = {})", enough.friction),
+    let are_soft = model.fingers.iter().all(|finger| matches!(finger.contact, ContactModel::SoftFinger { .. }));
+    failure.advice =
+        format!("{}; {}", what_helps(enough.friction, model.view.object.friction, are_soft), failure.advice);
+}
+
+/// What to change where the friction coefficient `enough` would do: nothing that the scene has already.
+fn what_helps(enough: f64, of_scene: f64, are_soft: bool) -> String {
+    let friction = match enough > of_scene {
+        true => format!("fingertips with more friction (friction = {enough})"),
         false => "a smaller `friction_margin` in the settings, where the scene's friction is sure".to_owned(),
     };
-    if model.fingers.iter().any(|finger| !matches!(finger.contact, ContactModel::SoftFinger { .. })) {
-        advice += ", or soft fingertips (contact = \"soft_finger\")";
-    }
-    failure.advice = format!("{advice}; {}", failure.advice);
+    let soft = if are_soft { "" } else { ", or soft fingertips (contact = \"soft_finger\")" };
+    friction + soft
 }
 
 /// Number of grasps drawn, and in how many of them each finger may lift: with the friction that is planned with, then with more
@@ -117,4 +122,20 @@ fn contacts_at(workspace: &mut Workspace, pose: &Pose, rng: &mut Rng) -> Option<
         (!found.is_empty()).then_some(found)
     };
     (0..n_fingers).map(of_finger).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::what_helps;
+
+    #[test]
+    fn nothing_is_advised_that_the_scene_has() {
+        assert_eq!(
+            what_helps(1.0, 0.8, false),
+            "fingertips with more friction (friction = 1), or soft fingertips (contact = \"soft_finger\")"
+        );
+        assert_eq!(what_helps(1.5, 0.8, true), "fingertips with more friction (friction = 1.5)");
+        let margin = what_helps(0.8, 0.8, true);
+        assert!(margin.contains("friction_margin") && !margin.contains("0.8") && !margin.contains("soft"), "{margin}");
+    }
 }

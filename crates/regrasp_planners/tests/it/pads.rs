@@ -3,10 +3,12 @@
 
 use crate::queries::Queries;
 use regrasp_base::Budget;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_geometry::Vector;
+use regrasp_plan::check::{CheckSettings, ViolationKind, check};
+use regrasp_plan::{Plan, SegmentKind};
 use regrasp_planners::in_hand::{InHandSettings, plan_in_hand};
 use regrasp_robot::LoadOptions;
-use regrasp_scene::{LoadedScene, load_scene};
+use regrasp_scene::{LoadedScene, Query, load_scene};
 use std::fmt::Write;
 
 /// Four fingers of three joints about a palm, whose tips are boxes of 10 x 16 x 20 mm.
@@ -86,5 +88,36 @@ fn forces_balance_between_waypoints_where_pads_tip_over() {
         let query = loaded.task().query(seed);
         let report = check((&loaded.scene, &loaded.state), Some(&query), &plan, &CheckSettings::default());
         assert!(report.accepted(), "{seed}: {report:#?}");
+        if seed == 0 {
+            plans_without_the_moments_between_are_rejected(&loaded, &query, &plan);
+        }
     }
+}
+
+/// The plan with longer steps, in which contacts sweep over the object: forces balance at both ends, and the checker looks between them, not
+/// half-way alone.
+fn plans_without_the_moments_between_are_rejected(loaded: &LoadedScene, query: &Query, plan: &Plan) {
+    let (mut n_tried, mut n_rejected, mut n_elsewhere) = (0, 0, 0);
+    for (s, segment) in plan.segments.iter().enumerate().filter(|(_, segment)| segment.kind == SegmentKind::Transfer) {
+        for first in (0..segment.waypoints.len().saturating_sub(4)).step_by(2) {
+            let ends = [first, first + 4].map(|w| &segment.waypoints[w].contacts);
+            let travel = |f: usize| {
+                let [a, b] = ends.map(|contacts| contacts[f].point_in_object.map(Vector::from));
+                Some((b? - a?).norm())
+            };
+            if (0..4).filter_map(travel).all(|travel| travel < 6e-3) {
+                continue;
+            }
+            let mut broken = plan.clone();
+            broken.segments[s].waypoints.drain(first + 1..first + 4);
+            let report = check((&loaded.scene, &loaded.state), Some(query), &broken, &CheckSettings::default());
+            let unbalanced =
+                report.violations.iter().filter(|violation| violation.kind == ViolationKind::ForceUnbalanced);
+            let messages: Vec<&str> = unbalanced.map(|violation| violation.message.as_str()).collect();
+            n_tried += 1;
+            n_rejected += usize::from(!messages.is_empty());
+            n_elsewhere += usize::from(messages.iter().any(|message| message.contains(" of the way to the next")));
+        }
+    }
+    assert!(n_tried > 0 && n_rejected == n_tried && n_elsewhere > 0, "{n_tried} {n_rejected} {n_elsewhere}");
 }

@@ -45,6 +45,11 @@ impl Foothold {
     }
 }
 
+/// Forgets those that were drawn first, where there are too many.
+fn keep_newest(footholds: &mut Vec<Foothold>) {
+    footholds.drain(..footholds.len().saturating_sub(POOL_SIZE));
+}
+
 impl Pool {
     /// An empty pool at `world_from_object`, for the way to `aim`.
     pub fn new(world_from_object: &Pose, aim: &Pose, n_fingers: usize) -> Self {
@@ -105,8 +110,7 @@ impl Pool {
         search.workspace.place_object(&self.world_from_object);
         if self.way.stays() {
             // All follow as far: the newest are kept, or no other would ever be tried.
-            let n_over = footholds.len().saturating_sub(POOL_SIZE);
-            footholds.drain(..n_over);
+            keep_newest(footholds);
         }
         footholds.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
         footholds.truncate(POOL_SIZE);
@@ -138,11 +142,39 @@ impl Pool {
             found.push(footholds[which].candidate(follow));
         }
         search.workspace.place_object(&self.world_from_object);
-        let n_over = footholds.len().saturating_sub(POOL_SIZE);
-        footholds.drain(..n_over);
+        keep_newest(footholds);
         // Stable: equal shares stay in random order.
         found.sort_by(|a: &Candidate, b| b.follow.total_cmp(&a.follow));
         found.truncate(n_wanted);
         found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::in_hand::roadmap_tests::with_settings;
+    use crate::settings::InHandSettings;
+
+    #[test]
+    fn where_the_object_stays_new_contacts_are_tried_on_and_on() {
+        with_settings("sphere_90x.toml", &InHandSettings::default(), |search| {
+            let start = search.start;
+            let mut pool = Pool::new(&start, &start, search.model().n_fingers());
+            let mut seen: Vec<Contact> = Vec::new();
+            let mut n_new = [0; 2];
+            for round in 0..400 {
+                for candidate in pool.towards_aim(search, 0, 4) {
+                    let contact = candidate.contact.expect("it touches");
+                    if !seen.contains(&contact) {
+                        seen.push(contact);
+                        n_new[round / 200] += 1;
+                    }
+                }
+                assert!(pool.of_finger[0].len() <= POOL_SIZE);
+            }
+            // Of 32 that stay for ever there is nothing new in the second half.
+            assert!(n_new[0] > 2 * POOL_SIZE && n_new[1] > 2 * POOL_SIZE, "{n_new:?}");
+        });
     }
 }
