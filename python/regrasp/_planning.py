@@ -185,6 +185,7 @@ def place(
     mass: float | None = None,
     friction: float | None = None,
     scale: float | str | None = None,
+    solid: Literal["mesh", "hull"] | None = None,
     torsion_radius: float | None = None,
     alternatives: int = 0,
     seed: int = 0,
@@ -204,6 +205,7 @@ def place(
     turns: turns about axes of the world that must look possible; of several, each becomes a task.
     mass, friction: of the object; 0.1 kg and 0.8 where neither these nor a scene say any.
     scale: of a mesh, as scene files have it.
+    solid: what stands for the inside of a mesh: its triangles, or its convex hull, for meshes that are not closed.
     torsion_radius: soft fingertips, where the hand file names no contact model.
     alternatives: scenes of the next best poses, up to 5.
     seed, time_limit, max_work: as in `plan`.
@@ -217,6 +219,8 @@ def place(
         friction = real("place", "friction", friction, lambda value: value >= 0, "a number from 0")
     if torsion_radius is not None:
         torsion_radius = real("place", "torsion_radius", torsion_radius, lambda value: 0 <= value <= 1, "metres, 0 to 1")
+    if solid not in (None, "mesh", "hull"):
+        raise argument_error("place", "solid", f"is {solid!r}", '"mesh" or "hull"')
     request: dict[str, Any] = {
         "hand": os.fspath(hand),
         "object": os.fspath(object),
@@ -225,6 +229,7 @@ def place(
         "mass": mass,
         "friction": friction,
         "scale": None if scale is None else str(scale),
+        "solid": solid,
         "torsion_radius": torsion_radius,
         "alternatives": whole("place", "alternatives", alternatives, 0, 5),
         "seed": seed_of("place", seed),

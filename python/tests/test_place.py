@@ -29,4 +29,6 @@ def test_what_does_not_fit_is_a_failure_and_nonsense_is_refused(tmp_path: Path) 
         regrasp.place(HAND, "sphere:0.03", tmp_path / "out.toml", turns=["up"])
     with pytest.raises(regrasp.InputError):
         regrasp.place(HAND, "sphere:0.03", tmp_path / "out.toml", mass=-1.0)
+    with pytest.raises(regrasp.InputError, match="is for meshes"):
+        regrasp.place(HAND, "sphere:0.03", tmp_path / "out.toml", solid="hull")
     assert list(tmp_path.iterdir()) == []

@@ -26,6 +26,8 @@ pub struct Asked<'a> {
     pub friction: Option<f64>,
     /// Scale of a mesh, as scene files have it; factors with commas between them.
     pub scale: Option<&'a str>,
+    /// What stands for the inside of a mesh, as scene files have it.
+    pub solid: Option<&'a str>,
     /// Soft fingertips of this torsion radius, in metres, where the hand file names no contact model.
     pub torsion_radius: Option<f64>,
     /// Folders of packages, by name.
@@ -58,10 +60,21 @@ impl Asked<'_> {
             let name = path.file_stem().map_or_else(|| "object".into(), |stem| stem.to_string_lossy());
             mesh(&if self.object.contains("://") { self.object.to_owned() } else { named(path) }, &name)
         };
+        let of_mesh = [("scale", self.scale.is_some()), ("solid", self.solid.is_some())];
+        let mut no_mesh = Table::new();
+        let inside = match object.get_mut("mesh").and_then(Value::as_table_mut) {
+            Some(inside) => inside,
+            None => match of_mesh.iter().find(|(_, is_given)| *is_given) {
+                Some((argument, _)) => {
+                    return Err(refused(argument, "is for meshes".into(), "a mesh file as the object"));
+                }
+                None => &mut no_mesh,
+            },
+        };
+        if let Some(solid) = self.solid {
+            inside.insert("solid".into(), Value::String(solid.to_owned()));
+        }
         if let Some(scale) = self.scale {
-            let Some(inside) = object.get_mut("mesh").and_then(Value::as_table_mut) else {
-                return Err(refused("scale", "is for meshes".into(), "a mesh file as the object"));
-            };
             let numbers: Option<Vec<f64>> = scale.split(',').map(|part| part.trim().parse().ok()).collect();
             let value = match numbers.as_deref() {
                 Some([factor]) => Value::Float(*factor),
@@ -93,6 +106,19 @@ impl Asked<'_> {
     }
 }
 
+/// What is wrong with the scene that was to be written: `draft`, for `path`, which nobody has yet: its lines are shown.
+pub fn of_draft(mut error: InputError, path: &Path, draft: &str) -> InputError {
+    for diagnostic in error.diagnostics.iter_mut().filter(|diagnostic| diagnostic.place.file == path) {
+        let line = diagnostic.place.line.and_then(|line| draft.lines().nth(line as usize - 1));
+        let shown = line.map_or(String::new(), |line| format!(" (line `{line}`)"));
+        diagnostic.problem = format!("{}, in the scene that would be written{shown}", diagnostic.problem);
+        if diagnostic.fix.contains("solid = \"hull\"") {
+            diagnostic.fix = format!("{}; for `regrasp place`, --solid hull", diagnostic.fix);
+        }
+    }
+    error
+}
+
 fn refused(argument: &str, problem: String, expected: &str) -> InputError {
     Diagnostic::new("A505", Place::file("arguments"), problem).element("argument", argument).expected(expected).into()
 }
@@ -104,8 +130,8 @@ mod tests {
     use regrasp_scene::load_scene_text;
 
     fn asked<'a>(object: &'a str, turns: &'a [Turn], output: &'a Path, hand: &'a Path) -> Asked<'a> {
-        let (mass, friction, scale, torsion_radius) = (None, None, None, None);
-        Asked { output, hand, object, turns, mass, friction, scale, torsion_radius, packages: &[] }
+        let (mass, friction, scale, solid, torsion_radius) = (None, None, None, None, None);
+        Asked { output, hand, object, turns, mass, friction, scale, solid, torsion_radius, packages: &[] }
     }
 
     /// What is written is read back as what was asked, with the start given and left open.
@@ -143,5 +169,33 @@ mod tests {
             }
         }
         assert_eq!(asked("sphere:0.03", &turns, &output, &hand).path(1), folder.path().join("scene.2.toml"));
+    }
+
+    /// A mesh with a hole has no volume; with its hull for its inside it has one. The line of the scene that nobody has yet is shown.
+    #[test]
+    fn a_refused_draft_shows_its_lines_and_the_option_that_helps() {
+        let folder = tempfile::tempdir().unwrap();
+        let hand = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/hands/wide_four_finger/hand.toml");
+        let (output, mesh) = (folder.path().join("scene.toml"), folder.path().join("open.obj"));
+        // A tetrahedron without its last face.
+        let text = "v 0 0 0\nv 0.05 0 0\nv 0 0.05 0\nv 0 0 0.05\nf 1 3 2\nf 1 2 4\nf 1 4 3\n";
+        std::fs::write(&mesh, text).unwrap();
+        let turns = [Turn::read("z:90").unwrap()];
+        let object = mesh.to_str().unwrap();
+        let open = asked(object, &turns, &output, &hand);
+        let load = |asked: &Asked| {
+            let draft = asked.scene().unwrap().text(None);
+            let loaded = load_scene_text(&output, draft.clone().into_bytes(), &LoadOptions::default());
+            loaded.map_err(|error| of_draft(error, &output, &draft).to_string())
+        };
+        let said = load(&open).err().unwrap();
+        assert!(said.contains("M210") && said.contains("(line `[object]`)"), "{said}");
+        assert!(said.contains("for `regrasp place`, --solid hull"), "{said}");
+        let loaded = load(&Asked { solid: Some("hull"), ..open }).unwrap();
+        // A quarter of the way from the right angle to each other corner.
+        let center = loaded.scene.objects[0].center_of_mass;
+        assert!((center - regrasp_geometry::Point::new(0.0125, 0.0125, 0.0125)).norm() < 1e-9, "{center}");
+        let refused = Asked { object: "sphere:0.03", solid: Some("hull"), ..open }.scene().unwrap_err().to_string();
+        assert!(refused.contains("argument \"solid\": is for meshes"), "{refused}");
     }
 }

@@ -38,15 +38,16 @@ impl Turn {
         if !(angle_deg.abs() <= 3600.0) {
             return Err("expected degrees between -3600 and 3600".into());
         }
-        let axis = axis.trim();
-        let value = match axis {
-            "x" | "y" | "z" => Value::String(axis.into()),
+        let (axis, angle) = (axis.trim(), angle.trim());
+        let (value, name) = match axis {
+            "x" | "y" | "z" => (Value::String(axis.into()), format!("{axis}{angle}")),
             _ => match numbers(axis).as_deref() {
-                Some([x, y, z]) if [x, y, z].iter().any(|part| **part != 0.0) => floats(&[*x, *y, *z]),
+                Some([x, y, z]) if [x, y, z].iter().any(|part| **part != 0.0) => {
+                    (floats(&[*x, *y, *z]), format!("{axis}_{angle}"))
+                }
                 _ => return Err(expected()),
             },
         };
-        let name = format!("{axis}{}", angle.trim());
         Ok(Turn { axis: value, name, angle_deg })
     }
 
@@ -239,7 +240,8 @@ mod tests {
     #[test]
     fn turns_and_primitives_are_read_or_refused_with_what_was_expected() {
         assert_eq!(Turn::read("z:90").unwrap().name(), "z90");
-        assert_eq!(Turn::read("1,0,1:-45").unwrap().angle_deg, -45.0);
+        let turn = Turn::read("1,0,1:-45").unwrap();
+        assert_eq!((turn.angle_deg, turn.name()), (-45.0, "1,0,1_-45"));
         for wrong in ["z", "z:", "w:90", "0,0,0:90", "z:NaN", "1,2:3", "z:1e9"] {
             assert!(Turn::read(wrong).is_err(), "{wrong}");
         }

@@ -125,8 +125,8 @@ impl Failure {
         let leader = tie.coupling.terms.first().map_or("another joint", |(leader, _)| name(*leader));
         let follower = name(tie.follower);
         let message = format!(
-            "hand \"{}\" has one motor for several fingers: joint \"{follower}\" follows joint \"{leader}\", and holding both still would \
-             leave a finger without a joint before its tip, so that fingers cannot let go one by one",
+            "hand \"{}\" has one motor for several fingers: joint \"{follower}\" follows joint \"{leader}\", and holding both still, with \
+             the joints before them on their fingers, would leave a finger without a joint, so that fingers cannot let go one by one",
             view.hand_name,
         );
         let advice = "pick the object up and put it down again (task = \"pick_and_place\"), or use a hand whose fingers move alone; to hold \

@@ -6,7 +6,7 @@ use crate::model::{Options, load_options};
 use crate::watch::watched;
 use pyo3::prelude::*;
 use regrasp::base::{Diagnostic, files};
-use regrasp::placing::Asked;
+use regrasp::placing::{Asked, of_draft};
 use regrasp::planners::in_hand::placing::place as find_places;
 use regrasp::scene::load_scene_text;
 use regrasp::scene_text::Turn;
@@ -26,6 +26,7 @@ pub struct Request {
     mass: Option<f64>,
     friction: Option<f64>,
     scale: Option<String>,
+    solid: Option<String>,
     torsion_radius: Option<f64>,
     alternatives: usize,
     seed: u64,
@@ -52,13 +53,16 @@ pub fn place(py: Python<'_>, request: Request, options: Options) -> PyResult<(Ve
             mass: request.mass,
             friction: request.friction,
             scale: request.scale.as_deref(),
+            solid: request.solid.as_deref(),
             torsion_radius: request.torsion_radius,
             packages: &options.resolve.packages,
         };
         let deadline = request.time_limit.map(|limit| Instant::now() + Duration::from_secs_f64(limit));
         let found = watched(py, None, |cancelled, report| -> Result<Result<Vec<PathBuf>, Failure>, InputError> {
             let text = asked.scene()?;
-            let loaded = load_scene_text(&request.output, text.text(None).into_bytes(), &options)?;
+            let draft = text.text(None);
+            let loaded = load_scene_text(&request.output, draft.clone().into_bytes(), &options)
+                .map_err(|error| of_draft(error, &request.output, &draft))?;
             let queries: Vec<InHandQuery> =
                 loaded.tasks.iter().filter_map(|task| task.query(request.seed).as_in_hand().cloned()).collect();
             let settings = InHandSettings { n_threads: 1, ..InHandSettings::default() };

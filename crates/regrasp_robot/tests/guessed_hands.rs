@@ -98,6 +98,46 @@ fn a_robot_with_two_hands_asks_for_one_and_takes_it() {
 }
 
 #[test]
+fn two_hands_on_one_stand_ask_for_one_and_are_taken_together_where_that_is_said() {
+    let hand = |side: &str, n_fingers: usize| {
+        let palm = format!("{side}_palm");
+        let mount = turning(&palm, "root").replace("revolute", "fixed");
+        let finger = |k: usize| finger(&format!("{side}_{k}"), &palm);
+        mount + &(0..n_fingers).map(finger).collect::<String>()
+    };
+    let parts = hand("left", 3) + &hand("right", 4);
+    assert_eq!(
+        guess(&parts, None).unwrap_err(),
+        [
+            "U208 hand.urdf: is a robot with more on it than one hand: several links carry three fingers or more each; expected one hand\n  \
+          fix: regrasp inspect with --base left_palm, or --base right_palm, or --base root for one hand of all fingers"
+        ]
+    );
+    assert_eq!(summary(&guess(&parts, Some("left_palm")).unwrap()).1.len(), 3);
+    assert_eq!(summary(&guess(&parts, Some("root")).unwrap()).1.len(), 7);
+    // A thumb, or two, on a link of its own makes no second hand.
+    let (base, fingers) = summary(&guess(&(hand("palm", 3) + &hand("thumb", 2)), None).unwrap());
+    assert_eq!((base.as_str(), fingers.len()), ("root", 5));
+}
+
+/// Nobody plans around what is only drawn, so it is said; fingertips have their own remark.
+#[test]
+fn links_that_are_drawn_and_have_no_collision_geometry_are_named() {
+    let drawn = r#"<link name="cover"><visual><geometry><box size="0.1 0.1 0.01"/></geometry></visual></link>"#;
+    let cover = turning("cover", "root").replace("revolute", "fixed").replace(r#"<link name="cover"/>"#, drawn);
+    let fingers = [finger("i", "root"), finger("m", "root"), finger("r", "root")].concat();
+    let said = |parts: &str| {
+        let notes = guess(parts, None).unwrap().notes;
+        notes.into_iter().filter(|note| note.starts_with("links that are drawn")).collect::<Vec<String>>()
+    };
+    assert_eq!(
+        said(&(cover + &fingers)),
+        ["links that are drawn but have no collision geometry, so that plans do not keep clear of them: \"cover\""]
+    );
+    assert_eq!(said(&fingers), [""; 0]);
+}
+
+#[test]
 fn a_gripper_on_an_arm_beside_wheels_is_named() {
     let arm = turning("torso", "root")
         + &turning("shoulder", "torso")

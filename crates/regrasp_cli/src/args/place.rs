@@ -17,6 +17,9 @@ pub struct Place {
     /// Turn about an axis of the world that must look possible, such as z:90; may be repeated: each becomes a task
     #[arg(long = "turn", value_name = "AXIS:DEG", default_value = "z:90", value_parser = Turn::read, allow_hyphen_values = true)]
     pub turns: Vec<Turn>,
+    /// Look for poses in which the hand holds the object, as `regrasp plan --hold` asks, and turns nothing
+    #[arg(long, conflicts_with = "turns")]
+    pub hold: bool,
     /// Scene file; the alternatives go beside it
     #[arg(short, long, value_name = "scene.toml")]
     pub output: PathBuf,
@@ -29,6 +32,9 @@ pub struct Place {
     /// Scale of a mesh, as scene files have it: a factor, three factors X,Y,Z, or a text
     #[arg(long, allow_negative_numbers = true)]
     pub scale: Option<String>,
+    /// What stands for the inside of a mesh: its triangles, or its convex hull, for meshes that are not closed
+    #[arg(long, value_name = "SOLID", value_parser = ["mesh", "hull"])]
+    pub solid: Option<String>,
     /// Soft fingertips of this torsion radius, in metres, where the hand file names no contact model
     #[arg(long, value_name = "M", value_parser = metres, allow_negative_numbers = true)]
     pub torsion_radius: Option<f64>,

@@ -85,6 +85,9 @@ pub fn run(arguments: &args::Inspect, common: &Common, talk: &Talk) -> Result<()
             files::write_atomic(path, text.as_bytes()).map_err(|error| Stop::unwritable(path, &error))?;
             talk.event("written", json!({ "path": path }));
             talk.say(format!("wrote  {}", path.display()));
+            if common.lenient {
+                talk.note("the URDF was read with --lenient; commands that read the hand file need --lenient too");
+            }
             Ok(())
         }
         (_, None) => Ok(()),

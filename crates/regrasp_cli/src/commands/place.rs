@@ -11,7 +11,7 @@ use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
 use regrasp::base::files;
-use regrasp::placing::Asked;
+use regrasp::placing::{Asked, of_draft};
 use regrasp::plan::check::{CheckSettings, check};
 use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::placing::probe::Probe;
@@ -41,6 +41,7 @@ pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), 
         mass: arguments.mass,
         friction: arguments.friction,
         scale: arguments.scale.as_deref(),
+        solid: arguments.solid.as_deref(),
         torsion_radius: arguments.torsion_radius,
         packages: &common.packages,
     };
@@ -58,15 +59,19 @@ pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), 
 
     let scene = asked.scene()?;
     let started = Instant::now();
-    let draft = scene.text(None).into_bytes();
-    let loaded = load_scene_text(&arguments.output, draft, &load::options(common))?;
+    let draft = scene.text(None);
+    let loaded = load_scene_text(&arguments.output, draft.clone().into_bytes(), &load::options(common))
+        .map_err(|error| of_draft(error, &arguments.output, &draft))?;
     load::say_loaded(&loaded, started.elapsed().as_secs_f64(), talk);
     let of_files = loaded.scene.inputs.iter().skip(1).map(|input| input.path.as_path());
     written
         .refuse_inputs(of_files.chain(arguments.object.ends_with(".toml").then_some(Path::new(&arguments.object))))?;
 
-    let queries: Vec<InHandQuery> =
+    let mut queries: Vec<InHandQuery> =
         loaded.tasks.iter().filter_map(|task| task.query(arguments.seed).as_in_hand().cloned()).collect();
+    if arguments.hold {
+        queries = queries.iter().take(1).map(InHandQuery::held).collect();
+    }
     let settings = InHandSettings { n_threads: available_threads(), ..InHandSettings::default() };
     let budget = Budget { deadline, cancelled: Arc::clone(&cancelled), ..Budget::work(arguments.max_work) };
     let started = Instant::now();
@@ -90,7 +95,14 @@ pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), 
             draw(path, &loaded, &queries, place, (&settings, arguments.seed, &budget), &packages, talk)?;
         }
     }
-    talk.say(format!("next   regrasp plan {} -o plan.json", arguments.output.display()));
+    if found.tried.solved == 0 {
+        let what = if arguments.hold { "no grasp that is planned and judged" } else { "none of the turns" };
+        talk.note(&format!(
+            "short searches found {what} at any pose: the scene has the pose that seems best, and its plan may need minutes or fail"
+        ));
+    }
+    let hold = if arguments.hold { " --hold" } else { "" };
+    talk.say(format!("next   regrasp plan {}{hold} -o plan.json", arguments.output.display()));
     Ok(())
 }
 
@@ -110,7 +122,7 @@ fn say_places(found: &Places, arguments: &args::Place, seconds: f64, talk: &Talk
         tried.solved,
         duration(seconds)
     ));
-    let names: Vec<&str> = arguments.turns.iter().map(Turn::name).collect();
+    let names: Vec<&str> = if arguments.hold { vec!["hold"] } else { arguments.turns.iter().map(Turn::name).collect() };
     talk.say(format!("       {:<24}  {:>6}  {:>9}  short searches", "position", "turned", "evidence"));
     for place in &found.places {
         let p = place.world_from_object.translation.vector;

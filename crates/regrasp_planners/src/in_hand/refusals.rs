@@ -55,7 +55,8 @@ pub fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
         fingers_in_words(model),
         friction_in_words(model)
     );
-    Err(Failure::bare(FailureKind::Impossible, message, MORE_FINGERS))
+    let advice = if may_close(&all, USUAL_FRICTION) { MORE_FRICTION } else { MORE_FINGERS };
+    Err(Failure::bare(FailureKind::Impossible, message, advice))
 }
 
 /// Refuses to move the object with hands of which the fingers that could follow it cannot hold it.
@@ -68,8 +69,9 @@ pub fn refuse_hand_that_cannot_follow(model: &Model) -> Result<(), Failure> {
          object. {}",
         joints_in_words(model)
     );
-    let advice = "ask whether the hand can hold the object (plan --hold), or move hand and object together (task = \"pick_and_place\"); \
-                  remove couplings from the hand file if the real joints move one by one";
+    let advice = "ask whether the hand can hold the object (`regrasp place --hold` writes a scene, `regrasp plan --hold` the grasp), or \
+                  move hand and object together (task = \"pick_and_place\"); if the real joints move one by one, remove what couples \
+                  them (<mimic> in the URDF, [[couplings]] in the hand file)";
     Err(Failure::bare(FailureKind::Impossible, message, advice))
 }
 
@@ -81,6 +83,10 @@ fn refuse_method_without_free_fingers(model: &Model, settings: &InHandSettings) 
     }
 }
 
+/// Friction of skin-like fingertips on most things.
+const USUAL_FRICTION: f64 = 0.8;
+const MORE_FRICTION: &str = "raise the friction (friction = 0.8 of the object; for `regrasp place`, --friction 0.8): without any, \
+     fingertips can only push along the normal";
 const MORE_FINGERS: &str = "use a hand with at least 4 fingers, or declare soft fingertips, of which two can hold (contact = \
      \"soft_finger\" and torsion_radius = 0.005 in the hand file; for `regrasp place`, --torsion-radius 0.005)";
 

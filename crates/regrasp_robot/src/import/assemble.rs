@@ -64,6 +64,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
             notes.push(format!("finger \"{}\": tip link \"{}\" has no collision geometry", finger.name, link.name));
         }
     }
+    notes.extend(drawn_only_note(robot, spec, carried.keys().copied()));
     let held =
         spec.held.iter().filter(|(joint, _)| !owner.contains_key(joint)).map(|(&joint, &at)| (joint, at)).collect();
     found.into_result((
@@ -79,6 +80,30 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
         },
         notes,
     ))
+}
+
+/// Links that are named at most.
+const MOST_NAMED: usize = 8;
+
+/// What is said of those of `links` that are drawn and have no collision geometry; fingertips have a remark of their own.
+fn drawn_only_note(robot: &Robot, spec: &HandSpec, links: impl Iterator<Item = LinkId>) -> Option<String> {
+    let is_tip = |link: LinkId| spec.fingers.iter().any(|finger| finger.tip_link == link);
+    let is_drawn_only = |link: &LinkId| {
+        let of = &robot.links[link.0];
+        of.collision.is_empty() && !of.visual.is_empty() && !is_tip(*link) && !spec.without_geometry.contains(link)
+    };
+    let drawn: Vec<String> =
+        links.filter(is_drawn_only).map(|link| format!("\"{}\"", robot.links[link.0].name)).collect();
+    let more = match drawn.len().saturating_sub(MOST_NAMED) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    let named = drawn[..drawn.len().min(MOST_NAMED)].join(", ");
+    (!drawn.is_empty()).then(|| {
+        format!(
+            "links that are drawn but have no collision geometry, so that plans do not keep clear of them: {named}{more}"
+        )
+    })
 }
 
 /// The moving joints of each finger, base first.

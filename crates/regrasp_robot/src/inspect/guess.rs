@@ -113,15 +113,19 @@ fn refuse_several_hands(robot: &Robot, base: LinkId, paths: &[Vec<JointId>], fil
     if palms == [base] {
         return Ok(());
     }
-    let choices: Vec<String> = palms.iter().map(|palm| format!("--base {}", robot.links[palm.0].name)).collect();
-    Err(Diagnostic::new(
-        "U208",
-        Place::file(file),
-        "is a robot with more on it than one hand: fingers share joints with others",
-    )
-    .expected("one hand")
-    .fix(format!("regrasp inspect with {}", choices.join(", or ")))
-    .into())
+    let mut choices: Vec<String> = palms.iter().map(|palm| format!("--base {}", robot.links[palm.0].name)).collect();
+    let shares = |k: usize| paths[..k].iter().any(|other| n_shared(other, &paths[k]) > 0);
+    let problem = match (0..paths.len()).any(shares) {
+        true => "is a robot with more on it than one hand: fingers share joints with others",
+        false => {
+            choices.push(format!("--base {} for one hand of all fingers", robot.links[base.0].name));
+            "is a robot with more on it than one hand: several links carry three fingers or more each"
+        }
+    };
+    Err(Diagnostic::new("U208", Place::file(file), problem)
+        .expected("one hand")
+        .fix(format!("regrasp inspect with {}", choices.join(", or ")))
+        .into())
 }
 
 /// The links that fingers with the joints of `paths` after `base` seem to stand on.
@@ -143,10 +147,20 @@ fn palms(robot: &Robot, base: LinkId, paths: Vec<&[JointId]>) -> Vec<LinkId> {
     if hands.is_empty() {
         hands = groups.values().filter(|group| group.len() >= 3).collect();
         if hands.len() < 2 {
-            return vec![here];
+            let mounted = mounted_palms(robot, paths.iter().filter_map(|path| path.get(n_common)));
+            return if mounted.len() < 2 { vec![here] } else { mounted };
         }
     }
     hands.into_iter().flat_map(|group| palms(robot, here, group.clone())).collect()
+}
+
+/// Links that carry three fingers or more each, of fingers that begin with the joints `first`.
+fn mounted_palms<'a>(robot: &Robot, first: impl Iterator<Item = &'a JointId>) -> Vec<LinkId> {
+    let mut n_fingers: BTreeMap<LinkId, usize> = BTreeMap::new();
+    for joint in first {
+        *n_fingers.entry(robot.joints[joint.0].parent).or_default() += 1;
+    }
+    n_fingers.into_iter().filter(|(_, n)| *n >= 3).map(|(link, _)| link).collect()
 }
 
 /// How many joints two paths have in common.

@@ -153,6 +153,11 @@ impl<'a> Search<'a> {
         self.passages = Passages::of(self.model(), self.settings.search.wander_distance, [&start, &goal]);
     }
 
+    /// Why no grasp was found among the contacts at hand.
+    pub fn no_grasp(&self) -> Reason {
+        if self.holds_only { Reason::NotHeld } else { Reason::NotClosed }
+    }
+
     /// Why attempts failed, with the grasps that were refused for want of forces.
     pub fn whole_tally(&self) -> Tally {
         let mut tally = self.tally.clone();

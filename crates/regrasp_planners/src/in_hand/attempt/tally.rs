@@ -15,6 +15,8 @@ pub enum Reason {
     NoContact(usize),
     /// The contacts found make no closed grasp with a finger that may let go.
     NotClosed,
+    /// The same where the object is only to be held, so that no finger needs to let go.
+    NotHeld,
     /// A closed grasp was found, but the fingers find no free way to it in any order.
     NoWayOver,
     /// A closed grasp was found and some finger may move to it, but then no order remains in which the others always hold the object.
@@ -174,6 +176,7 @@ impl Tally {
                 reason: match reason {
                     Reason::NoContact(f) => format!("finger \"{}\" found no contact within its reach", finger_name(f)),
                     Reason::NotClosed => "found no grasp that still holds the object after one finger lifts".into(),
+                    Reason::NotHeld => "found no grasp that holds the object".into(),
                     Reason::NoWayOver => "found no collision-free path for the fingers to the next grasp".into(),
                     Reason::NoOrder => {
                         "found no order of moving the fingers in which the others always hold the object".into()
@@ -216,6 +219,7 @@ impl Tally {
             let key = match reason {
                 Reason::NoContact(_) => "no_contact",
                 Reason::NotClosed => "not_closed",
+                Reason::NotHeld => "not_held",
                 Reason::NoWayOver => "no_way_over",
                 Reason::NoOrder => "no_order",
                 Reason::Bound(_) => "not_released",

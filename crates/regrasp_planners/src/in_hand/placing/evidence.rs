@@ -70,7 +70,7 @@ impl Evidence {
         search.workspace.place_object(hand_from_object);
         evidence.grasp = choose_grasp(search, hand_from_object, &options, None);
         if evidence.grasp.is_none() {
-            search.tally.add(Reason::NotClosed);
+            search.tally.add(search.no_grasp());
         }
         evidence
     }

@@ -19,7 +19,7 @@ pub mod samples;
 pub mod sizes;
 
 use crate::in_hand::attempt::search::{Context, Search};
-use crate::in_hand::attempt::tally::{Reason, Tally};
+use crate::in_hand::attempt::tally::Reason;
 use crate::in_hand::effective;
 use crate::settings::InHandSettings;
 pub use hint::with_hint;
@@ -179,7 +179,7 @@ pub fn place(
         return Err(Failure::bare(FailureKind::Interrupted, "interrupted".into(), ""));
     }
     if places.is_empty() {
-        return Err(not_found(model, &best, &search.whole_tally(), &tried, cut));
+        return Err(not_found(model, &best, &search, &tried, cut));
     }
     // Stable: of equals the one that was estimated better stays first.
     places.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
@@ -402,7 +402,9 @@ fn best_apart(
 }
 
 /// Why no place was found: the causes, and the pose that looked best.
-fn not_found(model: &Model, best: &[(f64, Pose)], tally: &Tally, tried: &Tried, cut: Option<Interrupt>) -> Failure {
+fn not_found(model: &Model, best: &[(f64, Pose)], search: &Search, tried: &Tried, cut: Option<Interrupt>) -> Failure {
+    let tally = search.whole_tally();
+    let wanted = if search.holds_only { "" } else { " and a finger may lift" };
     let mut causes = tally.causes(model);
     if tried.blocked > 0 {
         let reason = "the object is in collision with palm or obstacles at the start or on its way".to_owned();
@@ -413,7 +415,7 @@ fn not_found(model: &Model, best: &[(f64, Pose)], tally: &Tally, tried: &Tried, 
     causes.sort_by_key(|cause| std::cmp::Reverse(cause.count));
     let object = model.view.object;
     let message = format!(
-        "found no pose of \"{}\" (farthest point {:.0} mm from its centre of mass) in which the hand holds it and a finger may lift: \
+        "found no pose of \"{}\" (farthest point {:.0} mm from its centre of mass) in which the hand holds it{wanted}: \
          of {} poses estimated {} were looked at with all links{}",
         object.name,
         1e3 * object.radius,

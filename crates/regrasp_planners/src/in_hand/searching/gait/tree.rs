@@ -489,7 +489,7 @@ fn sow(search: &mut Search, tree: &mut Tree) -> Option<usize> {
             advance(search, tree, node, &aim, here).or(Some(node))
         }
         None => {
-            search.tally.add(Reason::NotClosed);
+            search.tally.add(search.no_grasp());
             None
         }
     }
