@@ -6,6 +6,7 @@ mod campaign;
 mod grasp_growth;
 mod grasp_replay;
 mod grasps;
+mod matrix;
 mod reference;
 mod replay;
 mod run;
@@ -19,7 +20,7 @@ use std::process::ExitCode;
 type Task = (&'static str, &'static str, fn(&[String]) -> Outcome);
 
 /// All tasks, in the order in which `cargo xtask` lists them.
-const TASKS: [Task; 18] = [
+const TASKS: [Task; 19] = [
     (
         "reference",
         "write the generated pages of docs/reference (--check: fail if they are out of date)",
@@ -50,6 +51,7 @@ const TASKS: [Task; 18] = [
     ("bench-arms", "motions of whole robots: problems of MotionBenchMaker, super graphs; needs PyYAML", bench::arms),
     ("bench-tasks", "tasks of pick and place beside the table of Saut 2010, as out/tasks/tasks.md", tasks::bench),
     ("growth", "measure how loading and planning grow with fingers, triangles, obstacles and threads", bench::growth),
+    ("bench-matrix", "every object in three hands, placed by the tool (CELLS=N, AT_ONCE=N; page)", matrix::task),
     ("bench-scans", "turn scanned objects that are not convex in the Allegro hand", scans::task),
     (
         "benchmark-page",
