@@ -310,6 +310,26 @@ fn spreads_that_fingers_share_by_a_coupling_are_held() {
     assert!(loaded.notes.iter().any(|note| note.contains("\"i_low\" belongs to no finger")), "{:?}", loaded.notes);
 }
 
+/// A motor that moves the last joints of several fingers cannot be held; the table of joints says what follows what.
+#[test]
+fn last_joints_that_fingers_share_are_listed_with_what_they_follow() {
+    let mimic = r#"upper="1"/><mimic joint="i_high" multiplier="0.5"/></joint>"#;
+    let fingers = finger("m", "root");
+    let (low, high) = fingers.split_once(r#"<link name="m_b">"#).unwrap();
+    let high = high.replacen(r#"upper="1"/></joint>"#, mimic, 1);
+    let parts = [finger("i", "root"), format!(r#"{low}<link name="m_b">{high}"#), finger("t", "root")].concat();
+    let folder = tempfile::tempdir().unwrap();
+    let loaded = load(folder.path(), &parts, "", "hand.urdf", None).unwrap();
+    assert_eq!(loaded.hand.ties.len(), 1);
+    let settings = regrasp_robot::inspect::InspectSettings { n_postures: 10 };
+    let mut rng = regrasp_base::Rng::keyed(0, "test", 0);
+    let path = folder.path().join("hand.urdf");
+    let found = regrasp_robot::inspect::inspect(&path, &LoadOptions::default(), &settings, &mut rng).unwrap();
+    let follows = found.robot.joints.iter().filter_map(|row| Some((row.name.as_str(), row.follows.as_ref()?)));
+    let follows: Vec<(&str, &str, f64)> = follows.map(|(name, f)| (name, f.joint.as_str(), f.multiplier)).collect();
+    assert_eq!(follows, [("m_high", "i_high", 0.5)]);
+}
+
 /// Where a motor that fingers share is held: in the middle of what it and its followers can do, or where the file says. Joints, tips and
 /// held positions are the same in the file that is written.
 #[test]

@@ -142,7 +142,11 @@ pub fn inspect(
 ) -> Result<Inspection, InputError> {
     match load_hand(path, options) {
         Ok(loaded) => {
-            let robot = inspect_robot(&loaded.hand.robot, path);
+            let mut robot = inspect_robot(&loaded.hand.robot, path);
+            // Joints that follow other fingers are coordinates of the hand, but they follow all the same.
+            for tie in &loaded.hand.ties {
+                robot.joints[tie.follower.0].follows = Some(Follows::new(&loaded.hand.robot, &tie.coupling));
+            }
             let table = inspect_hand(&loaded.hand, settings, rng);
             let tree = loaded.hand.robot.clone();
             Ok(Inspection { tree, robot, hand: Ok((loaded.hand, table)), inputs: loaded.inputs, notes: loaded.notes })

@@ -55,7 +55,7 @@ pub struct Leader {
 }
 
 impl Follows {
-    fn new(robot: &Robot, coupling: &Coupling) -> Self {
+    pub(super) fn new(robot: &Robot, coupling: &Coupling) -> Self {
         let leader = |&(id, multiplier): &(JointId, f64)| Leader { joint: robot.joints[id.0].name.clone(), multiplier };
         let Leader { joint, multiplier } = leader(&coupling.terms[0]);
         let others = coupling.terms[1..].iter().map(leader).collect();
