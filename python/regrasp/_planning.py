@@ -190,7 +190,7 @@ def place(
     alternatives: int = 0,
     seed: int = 0,
     time_limit: float | None = None,
-    max_work: int = 1_000_000,
+    max_work: int = 3_000_000,
     packages: Mapping[str, StrPath] | None = None,
 ) -> list[Scene] | Failure:
     """Finds poses of an object in a hand from which it can be turned, and writes a scene for the best of them.

@@ -51,6 +51,6 @@ pub struct Place {
     #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     pub time_limit: Option<Duration>,
     /// Work limit, in configurations examined: the same on every machine
-    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = whole_number, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 3_000_000, value_parser = whole_number, allow_negative_numbers = true)]
     pub max_work: u64,
 }
