@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SpeedSettings {
-    /// Largest speed of fingertips and of the object's surface, in metres per second. Origin: simulation of a prototype;
-    /// 0.08 made no clear difference.
+    /// Largest speed of fingertips and of the object's surface, in metres per second. Origin: replays in simulation, where
+    /// plans at 0.1 were kept as often as plans at 0.04 (docs/reference/replay.md).
     pub largest_speed: f64,
     /// Largest velocity of joints whose robot file states none, in radians or metres per second. What small servos
     /// reach.
@@ -22,7 +22,7 @@ pub struct SpeedSettings {
 
 impl Default for SpeedSettings {
     fn default() -> Self {
-        SpeedSettings { largest_speed: 0.04, joint_velocity: 2.0, joint_acceleration: 20.0, ramp: 0.25 }
+        SpeedSettings { largest_speed: 0.1, joint_velocity: 2.0, joint_acceleration: 20.0, ramp: 0.25 }
     }
 }
 

@@ -55,7 +55,8 @@ pub struct Balance {
     pub force: f64,
     /// Of moments at waypoints, in newton metres.
     pub moment: f64,
-    /// Half-way between waypoints, and where contacts travel far at more moments, torques over the torque scale, as a share of the sum of all normal forces.
+    /// Half-way between waypoints, and where contacts travel far at more moments, torques over the torque scale, as a share
+    /// of the sum of all normal forces.
     pub half_way: f64,
     /// Of the friction of sliding fingertips, as a share of friction times normal force; none when no finger slides.
     pub sliding: Option<f64>,
@@ -444,8 +445,8 @@ impl Judge<'_> {
     }
 }
 
-/// Way of a contact over the object from one waypoint to the next, in metres, from which on it is looked at in more moments than half-way.
-/// A flat pad that tips over sweeps over its whole width between two of them.
+/// Way of a contact over the object from one waypoint to the next, in metres, from which on it is looked at in more
+/// moments than half-way. A flat pad that tips over sweeps over its whole width between two of them.
 const FAR_TRAVEL: f64 = 2e-3;
 
 /// Where a fingertip slides by its relative velocity, across `normal`: a unit vector, or zero without one; none in modes

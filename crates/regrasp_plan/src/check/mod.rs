@@ -174,8 +174,8 @@ pub struct CheckSettings {
     /// Joint torques may be off by this share of (force times largest lever arm), and those that the weight of some direction
     /// may need above their limit by this share of it.
     pub torque_tolerance: f64,
-    /// Half-way between two waypoints, and where contacts travel far at more moments, the imbalance (torques over the torque scale) may be this share of the sum of all
-    /// normal forces.
+    /// Half-way between two waypoints, and where contacts travel far at more moments, the imbalance (torques over the
+    /// torque scale) may be this share of the sum of all normal forces.
     pub half_way_imbalance: f64,
     /// Joint velocities that should be zero, or below another, may miss that by this much, in rad/s or m/s.
     pub velocity_tolerance: f64,
@@ -303,8 +303,8 @@ pub struct Report {
     pub max_force_residual: Option<f64>,
     /// Largest imbalance of moments at a waypoint, in newton metres; none in plans without forces.
     pub max_moment_residual: Option<f64>,
-    /// Largest imbalance half-way between waypoints, and where contacts travel far at more moments, torques over the torque scale, as a share of the sum of all normal
-    /// forces; none in plans without forces.
+    /// Largest imbalance half-way between waypoints, and where contacts travel far at more moments, torques over the
+    /// torque scale, as a share of the sum of all normal forces; none in plans without forces.
     pub max_half_way_imbalance: Option<f64>,
     /// Largest distance of the friction of a sliding fingertip from Coulomb's law, as a share of friction times normal
     /// force; none when no finger slides.
