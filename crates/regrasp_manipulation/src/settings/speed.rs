@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SpeedSettings {
-    /// Largest speed of fingertips and of the object's surface, in metres per second. Origin: replays in simulation, where
-    /// plans at 0.1 were kept as often as plans at 0.04 (docs/reference/replay.md).
+    /// Largest speed of fingertips and of the object's surface, in metres per second. Origin: replays in simulation at
+    /// 0.04 and 0.1 (docs/reference/replay.md).
     pub largest_speed: f64,
     /// Largest velocity of joints whose robot file states none, in radians or metres per second. What small servos
     /// reach.
