@@ -56,7 +56,7 @@ struct Campaign {
 }
 
 /// Measures the cells that have no rows yet, `AT_ONCE` at a time and `CELLS` at most, and writes the page; with the argument `page` only
-/// the page.
+/// the page. Other arguments are the hands to measure; none are all.
 pub fn task(arguments: &[String]) -> Outcome {
     let known = read_rows()?;
     if arguments.first().is_none_or(|word| word != "page") {
@@ -66,7 +66,15 @@ pub fn task(arguments: &[String]) -> Outcome {
             Campaign { program: regrasp()?, models, folder: out("matrix")?, commit, seeds: number("SEEDS", 5)? };
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
         let (at_once, most) = (number("AT_ONCE", cores.min(2))?, number("CELLS", u64::MAX)?);
-        let missing = cells().into_iter().filter(|cell| !known.contains_key(&cell.map(str::to_owned).to_vec()));
+        if let Some(unknown) = arguments.iter().find(|word| !HANDS.contains(&word.as_str())) {
+            return Err(format!(
+                "{unknown:?} is no hand of the matrix; expected `page` or some of {}",
+                HANDS.join(", ")
+            ));
+        }
+        let is_asked = |hand: &str| arguments.is_empty() || arguments.iter().any(|word| word == hand);
+        let is_missing = |cell: &Cell| is_asked(cell[0]) && !known.contains_key(&cell.map(str::to_owned).to_vec());
+        let missing = cells().into_iter().filter(is_missing);
         measure(&campaign, missing.take(most.try_into().unwrap_or(usize::MAX)).collect(), at_once)?;
     }
     let text = page(&read_rows()?);

@@ -48,8 +48,8 @@ pub struct Place {
     #[arg(long, default_value_t = 0, value_parser = whole_number, allow_negative_numbers = true)]
     pub seed: u64,
     /// Time limit in seconds; it may only cut
-    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
-    pub time_limit: Option<Duration>,
+    #[arg(long, value_name = "S", default_value = "120", value_parser = seconds, allow_negative_numbers = true)]
+    pub time_limit: Duration,
     /// Work limit, in configurations examined: the same on every machine
     #[arg(long, value_name = "N", default_value_t = 3_000_000, value_parser = whole_number, allow_negative_numbers = true)]
     pub max_work: u64,

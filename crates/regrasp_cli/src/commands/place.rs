@@ -55,7 +55,7 @@ pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), 
     let written = Outputs::new(outputs.chain(pictures.iter().map(|path| Output::beside("--pictures", path.clone()))))?;
     arguments.pictures.as_deref().map_or(Ok(()), refuse_no_folder)?;
     let cancelled = interrupt::flag()?;
-    let deadline = arguments.time_limit.and_then(|limit| Instant::now().checked_add(limit));
+    let deadline = Instant::now().checked_add(arguments.time_limit);
 
     let scene = asked.scene()?;
     let started = Instant::now();
@@ -97,8 +97,12 @@ pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), 
     }
     if found.tried.solved == 0 {
         let what = if arguments.hold { "no grasp that is planned and judged" } else { "none of the turns" };
+        let cut = match deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+            true => format!("; --time-limit {} s stopped them", arguments.time_limit.as_secs_f64()),
+            false => String::new(),
+        };
         talk.note(&format!(
-            "short searches found {what} at any pose: the scene has the pose that seems best, and its plan may need minutes or fail"
+            "short searches found {what} at any pose{cut}: the scene has the pose that seems best, and its plan may need minutes or fail"
         ));
     }
     let hold = if arguments.hold { " --hold" } else { "" };

@@ -189,6 +189,11 @@ impl Surface {
         self.kind.project_signed(point, f64::INFINITY)
     }
 
+    /// The same, faster for the point `on_surface` of the surface that is known to be near: nothing farther is looked at.
+    pub fn project_signed_from(&self, point: &Point, on_surface: &Point) -> (SurfacePoint, f64) {
+        self.kind.project_signed(point, (point - on_surface).norm())
+    }
+
     /// The contact of a ball of radius `tip_radius` that touches the surface near `near` and penetrates nowhere; its
     /// normal points from the contact to the ball's centre. See `settle.rs`. None when no such ball is within reach.
     pub fn settle(&self, near: &SurfacePoint, tip_radius: f64) -> Option<SurfacePoint> {

@@ -60,13 +60,18 @@ impl Touch {
     fn of_ellipsoid(surface: &Surface, tip: &TipEllipsoid, stance: &Stance) -> Option<Self> {
         let inner = 0.5 * (tip.flattest() + tip.sharpest());
         let mut stance = *stance;
+        let mut known: Option<Point> = None;
         for _ in 0..MAX_GUESSES {
             let touching = stance.center + stance.arm(tip);
             let middle = touching + stance.normal * inner;
-            let (foot, distance) = surface.project_signed(&middle);
+            let (foot, distance) = match known {
+                Some(known) => surface.project_signed_from(&middle, &known),
+                None => surface.project_signed(&middle),
+            };
             if !(distance > 1e-9) {
                 return None;
             }
+            known = Some(foot.point_in_object);
             let normal = (middle - foot.point_in_object) / distance;
             let change = (normal - stance.normal).norm();
             stance.normal = normal;

@@ -53,7 +53,7 @@ use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
 use regrasp_manipulation::model::Model;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
-use regrasp_scene::{HandView, InHandQuery};
+use regrasp_scene::{GraspRequest, HandView, InHandQuery};
 use searching::attempts::{Left, run_attempts};
 use searching::first_try;
 use searching::legs::{Legs, Solution, plan_legs};
@@ -101,7 +101,8 @@ pub fn plan_in_hand(
 /// As [`plan_in_hand`], with the query and the answer in the hand's frame.
 fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget) -> Result<Plan, Failure> {
     let mut spent = 0;
-    for (first, work) in first_try::first_tries(asked.view, settings, budget) {
+    let gives_start = asked.query.start_grasp != GraspRequest::Automatic;
+    for (first, work) in first_try::first_tries(asked.view, settings, budget, gives_start) {
         let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
         match plan_with(asked, &first, &left, work) {
             Ok(mut plan) => {
@@ -145,7 +146,9 @@ fn plan_with(asked: &Asked, settings: &InHandSettings, whole: &Budget, first_wor
         let context = Context { model: &model, settings, seed, budget, winner, progress };
         let mut search = Search::new(context, [start_pose, goal_pose], index, work);
         search.holds_only = query.stays();
-        let planned = plan_legs(&mut search, &legs).and_then(|mut solution| {
+        let courses_work = if index == 0 && settings.method == Method::Gait { settings.search.courses_work } else { 0 };
+        let along_courses = improving::along_courses(&mut search, &legs, courses_work);
+        let planned = along_courses.map_or_else(|| plan_legs(&mut search, &legs), Ok).and_then(|mut solution| {
             if query.stays() {
                 // Any moment of it holds the object where it is asked for: the first does.
                 solution.way = Sequence::at(solution.way.start().clone());

@@ -64,6 +64,7 @@ flat! {
         free_after: u32,
         free_share: f64,
         restart_work: u64,
+        courses_work: u64,
         shortcuts: usize,
         improve_work: u64,
         long_plan: u64,
@@ -80,7 +81,7 @@ flat! {
         transfer, friction_margin, closure_margin, step, clearance, contact_allowance, limit_margin, joint_step, lift_heights, rrt_iterations, forces, speed,
     }
     search: SearchSettings {
-        release_rule, first_try, wander_distance, wander_angle, far_share, passage_share, goal_share, try_fee, aimless_share, candidates, candidates_kept, least_holding, transfers_alone, free_after, free_share, restart_work, shortcuts,
+        release_rule, first_try, wander_distance, wander_angle, far_share, passage_share, goal_share, try_fee, aimless_share, candidates, candidates_kept, least_holding, transfers_alone, free_after, free_share, restart_work, courses_work, shortcuts,
     }
     baselines: BaselineSettings {
         alpha, guided_share, edge_crossings, finger_ways,

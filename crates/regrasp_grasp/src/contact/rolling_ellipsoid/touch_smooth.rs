@@ -39,13 +39,16 @@ struct Seen {
 /// The touch of `tip` at `stance`, whose normal is the first guess; None inside the object, and where guesses do not settle.
 pub(super) fn touch(surface: &Surface, tip: &SmoothHull, stance: &Stance) -> Option<Touch> {
     let turn = stance.object_from_link;
-    let see = |normal: Vector| {
+    let see = |normal: Vector, known: Option<&Seen>| {
         let from = stance.center + turn * tip.point(&-turn.tr_mul(&normal)) + normal * INNER;
-        let (foot, distance) = surface.project_signed(&from);
+        let (foot, distance) = match known {
+            Some(known) => surface.project_signed_from(&from, &known.foot.point_in_object),
+            None => surface.project_signed(&from),
+        };
         let off = (distance > 1e-9).then(|| (from - foot.point_in_object) / distance - normal)?;
         Some(Seen { normal, from, foot, off })
     };
-    let mut now = see(stance.normal)?;
+    let mut now = see(stance.normal, None)?;
     let mut slope: Option<Slope> = None;
     for _ in 0..MOST_STEPS {
         let left = now.off.norm();
@@ -62,7 +65,7 @@ pub(super) fn touch(surface: &Surface, tip: &SmoothHull, stance: &Stance) -> Opt
         let mut share = (LONGEST_STEP / step.norm()).min(1.0);
         let halvings = if is_known { 1 } else { MOST_HALVINGS };
         let better = (0..halvings).find_map(|_| {
-            let next = see((now.normal + step * share).normalize());
+            let next = see((now.normal + step * share).normalize(), Some(&now));
             share *= 0.5;
             next.filter(|next| next.off.norm() < left)
         });
@@ -107,7 +110,7 @@ impl Slope {
         let places = Matrix2::from_columns(&across.map(|t| flat(&place(&t))));
         let seen = |t: &Vector| {
             let from = now.from + t * NUDGE;
-            let (foot, distance) = surface.project_signed(&from);
+            let (foot, distance) = surface.project_signed_from(&from, &now.foot.point_in_object);
             (distance > 1e-9).then(|| flat(&((from - foot.point_in_object) / distance - now.normal - now.off)) / NUDGE)
         };
         let normals = Matrix2::from_columns(&[seen(&across[0])?, seen(&across[1])?]);

@@ -1,5 +1,7 @@
 //! Better plans after the first, for as long as the budget lasts: the best so far is there at any moment.
 //!
+//! Queries that give the start grasp begin with such courses too, before any tree grows.
+//!
 //! Each round lays a course, a way of the object through all poses of the query; gathers tracks, contacts that fingers
 //! keep along parts of it, or roll along; and takes the cheapest gait on them that can be proven. The courses are the straight
 //! way, that of the best plan so far, whose own contacts are then among the tracks, the same with a part made straight, and
@@ -35,6 +37,7 @@ use course::{Corner, Course};
 use gaits::{Alone, Gaits, object_rest};
 use regrasp_base::{Interrupt, Rng};
 use regrasp_geometry::{Point, Pose, frame};
+use regrasp_manipulation::grasp::sequence::Sequence;
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::Model;
 use regrasp_plan::plan::{Improvement, PlanFigures};
@@ -192,6 +195,49 @@ fn search_beside(search: &mut Search, legs: &Legs, improvement: &Improvement) ->
     let is_better = figures.cost < improvement.improved.cost && !is_stuck(search.model(), solution.way.end());
     is_better.then_some((solution, figures))
 }
+
+/// A gait along a straight or bent course from a given start grasp, looked for with at most `most_work`; none where the planner
+/// chooses the start grasp, and where fingertips do not roll or restrict the object's motion.
+///
+/// A course is searched through as a whole: every order in which fingers may change between its tracks is considered, where trees
+/// see one relocation after the other. Where a short plan exists it is often found at once.
+pub fn along_courses(search: &mut Search, legs: &Legs, most_work: u64) -> Option<Solution> {
+    let model = search.model();
+    let start = legs.start_grasp?;
+    let restricts = (0..model.n_fingers()).any(|finger| model.restricts_motion(finger));
+    if most_work == 0 || search.holds_only || !model.any_rolls() || !model.may_release || restricts {
+        return None;
+    }
+    let mut beside = search.for_detour(COURSES, most_work.min(search.work_left()));
+    // Other tracks can stand in for a relocation that is hard to make.
+    beside.workspace.rrt_iterations = model.settings.rrt_iterations / CASUAL;
+    let resting = Solution { way: Sequence::at(start.clone()), steps_to_way: Vec::new() };
+    let found = (0..).find_map(|number: u64| {
+        let lay = if number.is_multiple_of(3) { Lay::Straight } else { Lay::Bent };
+        let mut rng = Rng::child(&beside.rng, "course", number);
+        match round(&mut beside, legs, &resting, &UNKNOWN, (lay, WHOLE), &mut rng) {
+            Ok(Some((solution, _))) => Some(Some(solution)),
+            Ok(None) => beside.check().is_err().then_some(None),
+            Err(_) => Some(None),
+        }
+    });
+    search.workspace.work += beside.workspace.work;
+    search.n_samples += beside.n_samples;
+    found.flatten()
+}
+
+/// Number of the search for a gait along courses, beside those that look for better plans.
+const COURSES: usize = usize::MAX;
+
+/// Of a plan that is not known yet: any costs less.
+const UNKNOWN: PlanFigures = PlanFigures {
+    relocations: 0,
+    transfers: 0,
+    object_path: 0.0,
+    joint_path: 0.0,
+    kept_margin: 0.0,
+    cost: f64::INFINITY,
+};
 
 /// A part of the best plan between two of its grasps done in a cheaper way, if one is found. Err as of [`round`].
 fn part(

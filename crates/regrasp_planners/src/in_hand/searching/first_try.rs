@@ -17,15 +17,28 @@ const SHARE_FOR_BOTH: f64 = 1.0 / 3.0;
 
 /// Settings and work of what is tried first, in order; none where there is nothing to try: more clearance and more closure, and
 /// more clearance alone.
-pub fn first_tries(view: &HandView, settings: &InHandSettings, budget: &Budget) -> Vec<(InHandSettings, u64)> {
+///
+/// Where the query gives the start grasp (`gives_start`) they only have the work of a look along courses. By measurement on chains of
+/// goals with the cube in the Allegro hand (80 queries, 600,000 configurations each): 65 are solved instead of 62, and the object
+/// moves for 8.4 s per 90 degrees instead of 12.6 s.
+pub fn first_tries(
+    view: &HandView,
+    settings: &InHandSettings,
+    budget: &Budget,
+    gives_start: bool,
+) -> Vec<(InHandSettings, u64)> {
     let Some(wanted) = settings.search.first_try.filter(|_| settings.method == Method::Gait) else { return Vec::new() };
+    let most_work = match gives_start && settings.search.courses_work > 0 {
+        true => wanted.work.min(settings.search.courses_work),
+        false => wanted.work,
+    };
     let can_keep = |finger: &Finger| stand_back(finger).is_none_or(|back| back >= 2.0 * wanted.clearance);
     let keeps_away = wanted.clearance > settings.physics.clearance && view.hand.fingers.iter().all(can_keep);
     let closes_more = wanted.closure_margin > settings.physics.closure_margin;
     let with = |keeps_away: bool, closes_more: bool, share: f64| {
         let clearance = if keeps_away { wanted.clearance } else { settings.physics.clearance };
         let closure_margin = if closes_more { wanted.closure_margin } else { settings.physics.closure_margin };
-        let work = ((wanted.work as f64 * share) as u64).min(budget.max_work / 4);
+        let work = ((most_work as f64 * share) as u64).min(budget.max_work / 4);
         let physics = PhysicsSettings { clearance, closure_margin, ..settings.physics.clone() };
         let search = SearchSettings { first_try: None, ..settings.search.clone() };
         (InHandSettings { physics, search, ..settings.clone() }, work)
@@ -79,7 +92,7 @@ mod tests {
         let with = |wanted: FirstTry| {
             let search = SearchSettings { first_try: Some(wanted), ..SearchSettings::default() };
             let settings = InHandSettings { search, ..InHandSettings::default() };
-            first_tries(&view, &settings, &Budget::work(1000))
+            first_tries(&view, &settings, &Budget::work(1000), false)
         };
         let (usual, wanted) = (InHandSettings::default(), FirstTry::default());
         assert!(with(FirstTry { closure_margin: 0.0, ..wanted }).is_empty());
