@@ -222,8 +222,8 @@ fn read_rows() -> Result<BTreeMap<Vec<String>, Vec<Row>>, String> {
 fn page(rows: &BTreeMap<Vec<String>, Vec<Row>>) -> String {
     let mut text = String::from(
         "# Every object in three hands\n\nMade by `cargo xtask bench-matrix` from `matrix.csv`; do not edit.\n\nEach cell: `regrasp place` \
-         chooses a pose, then five seeds search for at most 20 s of processor time on one thread, with default settings. Solved of tried, \
-         and mean processor time of the solved ones. Meshes whose middle extent is above 60 mm are fitted to it. Mass 0.1 kg. The hand \
+         chooses a pose, then five seeds search for at most 20 s on one thread, with default settings. Solved of tried, \
+         and mean processor time of the solved ones; a dash where it was not measured yet. Meshes whose middle extent is above 60 mm are fitted to it. Mass 0.1 kg. The hand \
          file of LEAP is as `regrasp inspect` writes it.\n",
     );
     for friction in FRICTIONS {
@@ -275,7 +275,13 @@ fn page(rows: &BTreeMap<Vec<String>, Vec<Row>>) -> String {
         }
     }
     let commits: std::collections::BTreeSet<&str> = rows.values().flatten().map(|row| row.commit.as_str()).collect();
-    let _ = write!(text, "\nMeasured at {}.\n", commits.into_iter().collect::<Vec<_>>().join(", "));
+    let _ = write!(
+        text,
+        "\nMeasured at {}: {} of {} cells.\n",
+        commits.into_iter().collect::<Vec<_>>().join(", "),
+        rows.len(),
+        cells().len()
+    );
     text
 }
 
