@@ -73,7 +73,7 @@ pub fn task(arguments: &[String]) -> Outcome {
             ));
         }
         let is_asked = |hand: &str| arguments.is_empty() || arguments.iter().any(|word| word == hand);
-        let is_missing = |cell: &Cell| is_asked(cell[0]) && !known.contains_key(&cell.map(str::to_owned).to_vec());
+        let is_missing = |cell: &Cell| is_asked(cell[0]) && !known.contains_key(cell.map(str::to_owned).as_slice());
         let missing = cells().into_iter().filter(is_missing);
         measure(&campaign, missing.take(most.try_into().unwrap_or(usize::MAX)).collect(), at_once)?;
     }
