@@ -52,8 +52,13 @@ pub(super) fn finger_names(robot: &Robot, base: LinkId, ends: &[End]) -> Vec<Str
             names[k] = Some(part);
         }
     }
-    let numbered = |k: usize| format!("finger_{}", k + 1);
-    names.into_iter().enumerate().map(|(k, name)| name.unwrap_or_else(|| numbered(k))).collect()
+    for k in 0..names.len() {
+        if names[k].is_none() {
+            // Another finger may have that number as its own part.
+            names[k] = (k + 1..).map(|number| format!("finger_{number}")).find(|name| is_alone(&names, name));
+        }
+    }
+    names.into_iter().flatten().collect()
 }
 
 /// What moving joints, their links and the links at the tip are called, in small letters.
