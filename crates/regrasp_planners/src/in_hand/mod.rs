@@ -55,6 +55,7 @@ use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_scene::{GraspRequest, HandView, InHandQuery};
 use searching::attempts::{Left, run_attempts};
+use searching::courses::first_look;
 use searching::first_try;
 use searching::legs::{Legs, Solution, plan_legs};
 use std::sync::atomic::AtomicUsize;
@@ -146,9 +147,8 @@ fn plan_with(asked: &Asked, settings: &InHandSettings, whole: &Budget, first_wor
         let context = Context { model: &model, settings, seed, budget, winner, progress };
         let mut search = Search::new(context, [start_pose, goal_pose], index, work);
         search.holds_only = query.stays();
-        let courses_work = if index == 0 && settings.method == Method::Gait { settings.search.courses_work } else { 0 };
-        let along_courses = improving::along_courses(&mut search, &legs, courses_work);
-        let planned = along_courses.map_or_else(|| plan_legs(&mut search, &legs), Ok).and_then(|mut solution| {
+        let at_first = if index == 0 { first_look(&mut search, &legs) } else { None };
+        let planned = at_first.map_or_else(|| plan_legs(&mut search, &legs), Ok).and_then(|mut solution| {
             if query.stays() {
                 // Any moment of it holds the object where it is asked for: the first does.
                 solution.way = Sequence::at(solution.way.start().clone());

@@ -1,7 +1,5 @@
 //! Better plans after the first, for as long as the budget lasts: the best so far is there at any moment.
 //!
-//! Queries that give the start grasp begin with such courses too, before any tree grows.
-//!
 //! Each round lays a course, a way of the object through all poses of the query; gathers tracks, contacts that fingers
 //! keep along parts of it, or roll along; and takes the cheapest gait on them that can be proven. The courses are the straight
 //! way, that of the best plan so far, whose own contacts are then among the tracks, the same with a part made straight, and
@@ -37,7 +35,6 @@ use course::{Corner, Course};
 use gaits::{Alone, Gaits, object_rest};
 use regrasp_base::{Interrupt, Rng};
 use regrasp_geometry::{Point, Pose, frame};
-use regrasp_manipulation::grasp::sequence::Sequence;
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::Model;
 use regrasp_plan::plan::{Improvement, PlanFigures};
@@ -60,7 +57,7 @@ const RAISE: f64 = 2.0;
 
 /// How a course is laid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Lay {
+pub enum Lay {
     /// Straight from pose to pose.
     Straight,
     /// Over a random pose between each two.
@@ -106,7 +103,7 @@ enum Rolling {
 
 /// Effort of one round.
 #[derive(Debug, Clone, Copy)]
-struct Effort {
+pub struct Effort {
     /// Tracks drawn per finger.
     n_drawn: usize,
     /// Nodes that one search for a gait expands at most, greedily and exactly.
@@ -118,7 +115,8 @@ struct Effort {
 const FIXED: Effort = Effort { n_drawn: DRAWN, most_expanded: MOST_EXPANDED, tries: TRIES };
 /// Where fingertips roll tracks cost far more, and more gaits are refuted. By hand.
 const PART: Effort = Effort { n_drawn: 20, most_expanded: [400, 150], tries: [6, 2] };
-const WHOLE: Effort = Effort { n_drawn: 50, most_expanded: [800, 200], tries: [10, 2] };
+/// For courses from start to goal.
+pub const WHOLE: Effort = Effort { n_drawn: 50, most_expanded: [800, 200], tries: [10, 2] };
 
 /// Steps of a plan that are looked at as one part, at most: mostly few, now and then more. By measurement on six scenes: parts
 /// of up to 4, 8 and 12 steps made straight take 4, 13 and 90 thousand units of work for each that is found.
@@ -196,60 +194,6 @@ fn search_beside(search: &mut Search, legs: &Legs, improvement: &Improvement) ->
     is_better.then_some((solution, figures))
 }
 
-/// A gait along a straight or bent course from a given start grasp, looked for with at most `most_work` after a short look by trees; none where the planner
-/// chooses the start grasp, and where fingertips do not roll or restrict the object's motion.
-///
-/// A course is searched through as a whole: every order in which fingers may change between its tracks is considered, where trees
-/// see one relocation after the other. Where a short plan exists it is often found at once. What trees find at once is shorter still.
-pub fn along_courses(search: &mut Search, legs: &Legs, most_work: u64) -> Option<Solution> {
-    let model = search.model();
-    let start = legs.start_grasp?;
-    let restricts = (0..model.n_fingers()).any(|finger| model.restricts_motion(finger));
-    if most_work == 0 || search.holds_only || !model.any_rolls() || !model.may_release || restricts {
-        return None;
-    }
-    let mut trees = search.for_detour(TREES, ((most_work as f64 * TREES_SHARE) as u64).min(search.work_left()));
-    let found = plan_legs(&mut trees, legs);
-    search.workspace.work += trees.workspace.work;
-    search.n_samples += trees.n_samples;
-    if found.is_ok() {
-        return found.ok();
-    }
-    let mut beside = search.for_detour(COURSES, most_work.min(search.work_left()));
-    // Other tracks can stand in for a relocation that is hard to make.
-    beside.workspace.rrt_iterations = model.settings.rrt_iterations / CASUAL;
-    let resting = Solution { way: Sequence::at(start.clone()), steps_to_way: Vec::new() };
-    let found = (0..).find_map(|number: u64| {
-        let lay = if number.is_multiple_of(3) { Lay::Straight } else { Lay::Bent };
-        let mut rng = Rng::child(&beside.rng, "course", number);
-        match round(&mut beside, legs, &resting, &UNKNOWN, (lay, WHOLE), &mut rng) {
-            Ok(Some((solution, _))) => Some(Some(solution)),
-            Ok(None) => beside.check().is_err().then_some(None),
-            Err(_) => Some(None),
-        }
-    });
-    search.workspace.work += beside.workspace.work;
-    search.n_samples += beside.n_samples;
-    found.flatten()
-}
-
-/// Number of the search for a gait along courses, beside those that look for better plans.
-const COURSES: usize = usize::MAX;
-/// That of the trees before it.
-const TREES: usize = usize::MAX - 1;
-/// Work of these trees, as a share of that for courses. By hand.
-const TREES_SHARE: f64 = 1.0 / 3.0;
-
-/// Of a plan that is not known yet: any costs less.
-const UNKNOWN: PlanFigures = PlanFigures {
-    relocations: 0,
-    transfers: 0,
-    object_path: 0.0,
-    joint_path: 0.0,
-    kept_margin: 0.0,
-    cost: f64::INFINITY,
-};
-
 /// A part of the best plan between two of its grasps done in a cheaper way, if one is found. Err as of [`round`].
 fn part(
     search: &mut Search,
@@ -324,7 +268,7 @@ fn range_within_leg(best: &Solution, rng: &mut Rng) -> [usize; 2] {
 
 /// A course and the cheapest gait found along it, if that is better than the best so far. Err when the search is to stop
 /// and nothing better was found.
-fn round(
+pub fn round(
     search: &mut Search,
     legs: &Legs,
     best: &Solution,

@@ -18,7 +18,7 @@ const SHARE_FOR_BOTH: f64 = 1.0 / 3.0;
 /// Settings and work of what is tried first, in order; none where there is nothing to try: more clearance and more closure, and
 /// more clearance alone.
 ///
-/// Where the query gives the start grasp (`gives_start`) they have little more work than a look along courses takes.
+/// Where the query gives the start grasp (`gives_start`) they have no more work than twice that of a look along courses.
 pub fn first_tries(
     view: &HandView,
     settings: &InHandSettings,
@@ -102,6 +102,10 @@ mod tests {
                 .collect()
         };
         assert_eq!(asked(&with(wanted)), [(usual.physics.clearance, wanted.closure_margin, 250)]);
+        let search = SearchSettings { first_try: Some(wanted), courses_work: 70, ..SearchSettings::default() };
+        let hurried = InHandSettings { search, ..InHandSettings::default() };
+        let with_start = first_tries(&view, &hurried, &Budget::work(1_000_000), true);
+        assert_eq!(asked(&with_start), [(usual.physics.clearance, wanted.closure_margin, 140)]);
         let nearer = FirstTry { clearance: 0.0005, work: 90, ..wanted };
         let both = [(0.0005, wanted.closure_margin, 30), (0.0005, usual.physics.closure_margin, 90)];
         assert_eq!(asked(&with(nearer)), both);
