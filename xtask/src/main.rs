@@ -51,7 +51,11 @@ const TASKS: [Task; 19] = [
     ("bench-arms", "motions of whole robots: problems of MotionBenchMaker, super graphs; needs PyYAML", bench::arms),
     ("bench-tasks", "tasks of pick and place beside the table of Saut 2010, as out/tasks/tasks.md", tasks::bench),
     ("growth", "measure how loading and planning grow with fingers, triangles, obstacles and threads", bench::growth),
-    ("bench-matrix", "every object in three hands, placed by the tool (CELLS=N, AT_ONCE=N; page)", matrix::task),
+    (
+        "bench-matrix",
+        "every object in three hands, placed by the tool (HAND...; CELLS=N, AT_ONCE=N, SEEDS=N; page)",
+        matrix::task,
+    ),
     ("bench-scans", "turn scanned objects that are not convex in the Allegro hand", scans::task),
     (
         "benchmark-page",

@@ -43,6 +43,12 @@ const OBJECTS: [(&str, &str, bool); 21] = [
     ("ycb_screwdriver", "ycb_043_phillips_screwdriver/mesh.obj", true),
 ];
 
+/// The file of an object, and whether its middle extent is fitted to 60 mm.
+pub fn object(name: &str) -> Result<(&'static str, bool), String> {
+    let found = OBJECTS.iter().find(|(own, ..)| *own == name);
+    found.map(|(_, file, is_fitted)| (*file, *is_fitted)).ok_or_else(|| format!("no object {name:?}"))
+}
+
 /// A hand, an object, a turn, a friction.
 type Cell = [&'static str; 4];
 
@@ -120,11 +126,11 @@ fn measure(campaign: &Campaign, missing: VecDeque<Cell>, at_once: u64) -> Outcom
 /// The rows of a cell: a pose from `regrasp place`, then as many plans as there are seeds.
 fn measured(campaign: &Campaign, cell: &Cell) -> Result<String, String> {
     let [hand, object, axis, friction] = cell;
-    let (_, file, is_fitted) = OBJECTS.iter().find(|(name, ..)| name == object).ok_or("an object without a file")?;
+    let (file, is_fitted) = self::object(object)?;
     let hand_file = hand_file(campaign, hand)?;
     let name = format!("{hand}_{object}_{axis}_{friction}");
     let scene = campaign.folder.join(format!("{name}.toml"));
-    let scale = if *is_fitted { "--scale fit:0.06" } else { "" };
+    let scale = if is_fitted { "--scale fit:0.06" } else { "" };
     let package = package(&campaign.models);
     let line = format!(
         "place {} package://models/objects/{file} {scale} --turn {axis}:90 --friction {friction} {package} -o {}",
@@ -197,6 +203,13 @@ struct Row {
     commit: String,
 }
 
+impl Row {
+    /// A plan was found, and the checker accepts it.
+    fn is_good(&self) -> bool {
+        self.status == "solved" && self.accepted
+    }
+}
+
 /// Rows by cell.
 fn read_rows() -> Result<BTreeMap<Vec<String>, Vec<Row>>, String> {
     let mut rows: BTreeMap<Vec<String>, Vec<Row>> = BTreeMap::new();
@@ -221,10 +234,12 @@ fn read_rows() -> Result<BTreeMap<Vec<String>, Vec<Row>>, String> {
 /// The page of the book.
 fn page(rows: &BTreeMap<Vec<String>, Vec<Row>>) -> String {
     let mut text = String::from(
-        "# Every object in three hands\n\nMade by `cargo xtask bench-matrix` from `matrix.csv`; do not edit.\n\nEach cell: `regrasp place` \
-         chooses a pose, then five seeds search for at most 20 s on one thread, with default settings. Solved of tried, \
-         and mean processor time of the solved ones; a dash where it was not measured yet. Meshes whose middle extent is above 60 mm are fitted to it. Mass 0.1 kg. The hand \
-         file of LEAP is as `regrasp inspect` writes it.\n",
+        "# Every object in three hands\n\n\
+         Made by `cargo xtask bench-matrix` from `matrix.csv`; do not edit.\n\n\
+         Each cell: `regrasp place` chooses a pose, then five seeds search for at most 20 s on one thread, with default settings. The table has \
+         the accepted plans of all trials, and their mean processor time; a dash where nothing was measured yet. The limit is that of a \
+         clock: on a busy machine a trial has less processor time, which the rows say (`plan_cpu_s`). Meshes whose middle extent is above \
+         60 mm are fitted to it. Mass 0.1 kg. The hand file of LEAP is as `regrasp inspect` writes it.\n",
     );
     for friction in FRICTIONS {
         let _ = write!(text, "\n## Friction {friction}\n\n| object |");
@@ -248,30 +263,26 @@ fn page(rows: &BTreeMap<Vec<String>, Vec<Row>>) -> String {
         for axis in ["z", "x", ""] {
             let of_turn = rows.iter().filter(|(cell, _)| cell[3] == friction && (axis.is_empty() || cell[2] == axis));
             let all: Vec<&Row> = of_turn.flat_map(|(_, rows)| rows).collect();
+            if all.is_empty() {
+                continue;
+            }
             let n_solved = all.iter().filter(|row| row.status == "solved").count();
-            let n_accepted = all.iter().filter(|row| row.accepted).count();
+            let n_good = all.iter().filter(|row| row.is_good()).count();
             let what = if axis.is_empty() { "both turns".to_owned() } else { format!("{axis} 90") };
-            let share = 100.0 * n_solved as f64 / all.len().max(1) as f64;
-            let _ = writeln!(
-                text,
-                "- {what}: {n_solved} of {} solved ({share:.0} %), {n_accepted} of them accepted.",
-                all.len()
-            );
+            let share = 100.0 * n_solved as f64 / all.len() as f64;
+            let _ = writeln!(text, "- {what}: {n_solved} of {} solved ({share:.0} %), {n_good} accepted.", all.len());
         }
     }
-    text += "\n## Causes\n\nCommonest cause in cells with misses.\n\n| hand | object | turn | friction | solved | cause |\n|---|---|---|---|---|---|\n";
+    text += "\n## Causes\n\nCommonest cause in cells with misses; of rejected plans, what the checker said.\n\n| hand | object | turn | friction | accepted | cause |\n|---|---|---|---|---|---|\n";
     for (cell, rows) in rows {
-        let n_solved = rows.iter().filter(|row| row.status == "solved").count();
+        let n_good = rows.iter().filter(|row| row.is_good()).count();
         let mut causes: BTreeMap<&str, usize> = BTreeMap::new();
-        rows.iter().filter(|row| row.status != "solved").for_each(|row| *causes.entry(&row.cause).or_default() += 1);
+        rows.iter().filter(|row| !row.is_good()).for_each(|row| *causes.entry(&row.cause).or_default() += 1);
         if let Some((cause, _)) = causes.iter().max_by_key(|(_, count)| **count) {
             let [hand, object, axis, friction] = &cell[..] else { continue };
             let cause = cause.replace('|', "/");
-            let _ = writeln!(
-                text,
-                "| {hand} | {object} | {axis} 90 | {friction} | {n_solved} of {} | {cause} |",
-                rows.len()
-            );
+            let _ =
+                writeln!(text, "| {hand} | {object} | {axis} 90 | {friction} | {n_good} of {} | {cause} |", rows.len());
         }
     }
     let commits: std::collections::BTreeSet<&str> = rows.values().flatten().map(|row| row.commit.as_str()).collect();
@@ -287,9 +298,9 @@ fn page(rows: &BTreeMap<Vec<String>, Vec<Row>>) -> String {
 
 /// `4/5 (1.2 s)`
 fn told(rows: &[Row]) -> String {
-    let solved: Vec<&Row> = rows.iter().filter(|row| row.status == "solved").collect();
-    let mean = solved.iter().map(|row| row.cpu_s).sum::<f64>() / solved.len().max(1) as f64;
-    match solved.len() {
+    let good: Vec<&Row> = rows.iter().filter(|row| row.is_good()).collect();
+    let mean = good.iter().map(|row| row.cpu_s).sum::<f64>() / good.len().max(1) as f64;
+    match good.len() {
         0 => format!("0/{}", rows.len()),
         n => format!("{n}/{} ({mean:.1} s)", rows.len()),
     }

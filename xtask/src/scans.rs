@@ -1,23 +1,23 @@
 //! `cargo xtask bench-scans`: scanned objects that are not convex, turned in the Allegro hand.
 
+use crate::matrix;
 use crate::run::{Outcome, models, number, out, package, regrasp, regrasp_with};
 use std::fs;
 use std::path::Path;
 
-/// Objects: name, file, and orientation (x, y, z, w) with the longest extent of the file along z and the middle one along y. The
-/// length is the middle extent they are fitted to, where they are larger.
-const OBJECTS: [(&str, &str, [f64; 4], bool); 11] = [
-    ("bull", "gso_Schleich_Hereford_Bull/mesh.obj", [0.0, H, H, 0.0], true),
-    ("horse", "gso_Breyer_Horse_Of_The_Year_2015/mesh.obj", [-0.5, -0.5, -0.5, 0.5], true),
-    ("gso_mug", "gso_Room_Essentials_Mug_White_Yellow/mesh.obj", [-0.5, -0.5, -0.5, 0.5], true),
-    ("ycb_mug", "ycb_025_mug/mesh.obj", [0.0, -H, 0.0, H], true),
-    ("banana", "ycb_011_banana/mesh.obj", [0.5, 0.5, 0.5, 0.5], true),
-    ("drill", "ycb_035_power_drill/mesh.obj", [0.5, 0.5, 0.5, 0.5], true),
-    ("mustard", "ycb_006_mustard_bottle/mesh.obj", [0.0, 0.0, H, H], true),
-    ("marker", "ycb_040_large_marker/mesh.obj", [0.5, 0.5, 0.5, 0.5], false),
-    ("gso_screwdriver", "gso_Craftsman_Grip_Screwdriver_Phillips_Cushion/mesh.obj", [-0.5, -0.5, -0.5, 0.5], false),
-    ("ycb_screwdriver", "ycb_043_phillips_screwdriver/mesh.obj", [0.0, -H, 0.0, H], true),
-    ("bottle", "robosuite_small/bottle.stl", [0.0, 0.0, 0.0, 1.0], false),
+/// Objects of `matrix` by name, and orientations (x, y, z, w) with the longest extent of the file along z and the middle one along y.
+const OBJECTS: [(&str, [f64; 4]); 11] = [
+    ("bull", [0.0, H, H, 0.0]),
+    ("horse", [-0.5, -0.5, -0.5, 0.5]),
+    ("gso_mug", [-0.5, -0.5, -0.5, 0.5]),
+    ("ycb_mug", [0.0, -H, 0.0, H]),
+    ("banana", [0.5, 0.5, 0.5, 0.5]),
+    ("drill", [0.5, 0.5, 0.5, 0.5]),
+    ("mustard", [0.0, 0.0, H, H]),
+    ("marker", [0.5, 0.5, 0.5, 0.5]),
+    ("gso_screwdriver", [-0.5, -0.5, -0.5, 0.5]),
+    ("ycb_screwdriver", [0.0, -H, 0.0, H]),
+    ("bottle", [0.0, 0.0, 0.0, 1.0]),
 ];
 
 /// Half the square root of two.
@@ -34,7 +34,7 @@ pub fn task(_: &[String]) -> Outcome {
         for axis in ["z", "x"] {
             for object in &OBJECTS {
                 let path = folder.join(format!("{}_{axis}_{tail}.toml", object.0));
-                fs::write(&path, scene(&root, object, axis, friction))
+                fs::write(&path, scene(&root, object, axis, friction)?)
                     .map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
                 scenes.push(path.display().to_string());
             }
@@ -46,15 +46,15 @@ pub fn task(_: &[String]) -> Outcome {
     regrasp_with(&program, &format!("bench {} {} {limits} --csv {csv}", scenes.join(" "), package(&models)))
 }
 
-fn scene(root: &Path, object: &(&str, &str, [f64; 4], bool), axis: &str, friction: f64) -> String {
-    let (name, file, quat, is_fitted) = object;
-    let scale = if *is_fitted { ", scale = \"fit:0.06\"" } else { "" };
+fn scene(root: &Path, (name, quat): &(&str, [f64; 4]), axis: &str, friction: f64) -> Result<String, String> {
+    let (file, is_fitted) = matrix::object(name)?;
+    let scale = if is_fitted { ", scale = \"fit:0.06\"" } else { "" };
     let hand = root.join("assets/hands/allegro_right/hand.toml");
-    format!(
+    Ok(format!(
         "format = \"regrasp-scene\"\nformat_version = 1\ntask = \"in_hand\"\n\n[hand]\nfile = {:?}\n\n[object]\nname = \"{name}\"\n\
          mesh = {{ file = \"package://models/objects/{file}\"{scale}, origin = \"center\" }}\nmass = 0.1\nfriction = {friction}\n\n\
          [start]\nposition = [0.082, 0.003, 0.005]\nquat_xyzw = {quat:?}\nposition_within = 0.005\n\n\
          [goal]\nturn = {{ axis = \"{axis}\", angle_deg = 90 }}\n",
         hand.display().to_string()
-    )
+    ))
 }

@@ -111,8 +111,9 @@ pub struct SearchSettings {
     /// costs a quarter on cylinder20_x.
     pub restart_work: u64,
     /// Work spent on gaits along straight and bent courses after a short look by trees, where the query gives the start grasp
-    /// and fingertips roll; 0 for none. By measurement on chains of goals with the cube in the Allegro hand: 1.4 s instead of
-    /// 2.4 s on the mean, with about as many solved.
+    /// and fingertips roll; first tries then have at most twice as much. 0 for neither. By measurement on chains of goals
+    /// with the cube in the Allegro hand, 90 queries and 600,000 configurations: 71 are solved with and without, in 1.8 s instead
+    /// of 2.6 s on the mean, and the motion is a seventh shorter. That of the wide hand's sphere is a sixth longer.
     pub courses_work: u64,
     /// Random shortcuts tried on the plan found. Origin: measurements on a prototype.
     pub shortcuts: usize,
