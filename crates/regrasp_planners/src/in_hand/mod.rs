@@ -9,7 +9,7 @@ mod attempt;
 mod friction;
 /// Contacts, and the grasps that they make.
 mod grasps;
-/// Better plans after the first.
+/// Better plans after the first, and a first look for one.
 mod improving;
 /// Motions of the object.
 mod moving;
@@ -43,6 +43,7 @@ pub use regrasp_manipulation::settings::{ForceSettings, PhysicsSettings, SpeedSe
 
 use attempt::search::{Context, Search, Stop};
 use attempt::tally::Reason;
+use improving::first_look::first_look;
 use recording::record;
 use refusals::{given_grasp, refuse_after_transfers, refuse_hopeless};
 use regrasp_base::{Budget, Interrupt, Rng};
@@ -55,7 +56,6 @@ use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_scene::{GraspRequest, HandView, InHandQuery};
 use searching::attempts::{Left, run_attempts};
-use searching::courses::first_look;
 use searching::first_try;
 use searching::legs::{Legs, Solution, plan_legs};
 use std::sync::atomic::AtomicUsize;

@@ -15,6 +15,8 @@ mod closure;
 mod cost;
 /// Ways of the object.
 mod course;
+/// A first look at queries that give the start grasp.
+pub mod first_look;
 /// The cheapest gait along a course.
 mod gaits;
 #[cfg(test)]

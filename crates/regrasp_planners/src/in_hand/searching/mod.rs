@@ -4,8 +4,6 @@
 pub mod attempts;
 /// The baseline of Saut 2011.
 pub mod classic;
-/// A first look at queries that give the start grasp.
-pub mod courses;
 /// A first try with more room.
 pub mod first_try;
 /// Two gait trees that grow until they meet.

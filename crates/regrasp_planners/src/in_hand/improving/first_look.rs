@@ -1,6 +1,6 @@
 //! A first look at queries that give the start grasp: trees for a moment, then gaits along whole courses.
 //!
-//! A course is searched through as a whole (`improving`): every order in which fingers may change their contacts along it is
+//! A course is searched through as a whole, as where plans are improved: every order in which fingers may change their contacts along it is
 //! considered, where trees see one relocation after the other. So a short plan is often found at once where trees need long, because
 //! the given grasp lets few fingers go. What trees find at once is shorter still, so they look first.
 
