@@ -1,7 +1,7 @@
 //! The surface of a box about the origin. Face `2 k` is at `+half_extents[k]`, face `2 k + 1` at `-half_extents[k]`.
 
 use super::geodesic::{Geodesic, Leg};
-use super::{SurfaceKind, SurfacePoint};
+use super::{Facing, SurfaceKind, SurfacePoint};
 use crate::frame::{Point, UnitVector, Vector};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion};
 use regrasp_base::Rng;
@@ -171,6 +171,16 @@ impl SurfaceKind for CuboidSurface {
     fn signed_distance(&self, point: &Point) -> f64 {
         let excess = point.coords.abs() - self.half_extents;
         excess.sup(&Vector::zeros()).norm() + excess.max().min(0.0)
+    }
+
+    fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<Facing> {
+        let is_beyond = |k: &usize| from[*k].abs() > self.half_extents[*k];
+        match (0..3).filter(is_beyond).count() {
+            1 => Some(Facing::Face(face_normal(at.facet))),
+            2 => (0..3).find(|k| !is_beyond(k)).map(|along| Facing::Edge(Vector::ith_axis(along))),
+            3 => Some(Facing::Corner),
+            _ => None,
+        }
     }
 
     fn crease_distance(&self, at: &SurfacePoint) -> f64 {

@@ -14,7 +14,7 @@ mod grain;
 use super::bvh::{Aabb, Bvh};
 use super::geodesic::Geodesic;
 use super::mesh_topology::{NONE, Topology, angle_at, creases, face_normals, patches};
-use super::{SurfaceError, SurfaceKind, SurfacePoint, unit_or};
+use super::{Facing, SurfaceError, SurfaceKind, SurfacePoint, unit_or};
 use crate::frame::{Point, UnitVector, Vector};
 use crate::mesh::TriangleMesh;
 use nalgebra::Matrix3;
@@ -278,6 +278,15 @@ impl SurfaceKind for MeshSurface {
     fn project_signed(&self, point: &Point, reach: f64) -> (SurfacePoint, f64) {
         let (facet, on_surface, feature) = self.nearest(point, reach);
         (self.surface_point(facet, on_surface), self.signed(point - on_surface, facet, feature))
+    }
+
+    fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<Facing> {
+        let corners = self.corners(at.facet);
+        Some(match nearest_on_triangle(&corners, from).1 {
+            Feature::Inside => Facing::Face(self.face_normal(at.facet)),
+            Feature::Edge(k) => Facing::Edge(UnitVector::try_new(corners[(k + 1) % 3] - corners[k], 0.0)?),
+            Feature::Corner(_) => Facing::Corner,
+        })
     }
 
     fn crease_distance(&self, at: &SurfacePoint) -> f64 {

@@ -51,6 +51,17 @@ impl SurfacePoint {
     }
 }
 
+/// What the nearest point of a surface made of flat faces lies on, as long as the point that sees it moves little.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Facing {
+    /// A flat face, with its outward normal.
+    Face(UnitVector),
+    /// A straight edge, with its direction.
+    Edge(UnitVector),
+    /// A corner.
+    Corner,
+}
+
 /// Why a shape has no usable surface.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
@@ -91,6 +102,10 @@ trait SurfaceKind: std::fmt::Debug + Send + Sync {
     /// Both, of a point that is no farther from the surface than `reach`.
     fn project_signed(&self, point: &Point, _reach: f64) -> (SurfacePoint, f64) {
         (self.project(point), self.signed_distance(point))
+    }
+    /// See [`Surface::facing`].
+    fn facing(&self, _at: &SurfacePoint, _from: &Point) -> Option<Facing> {
+        None
     }
     fn crease_distance(&self, at: &SurfacePoint) -> f64;
     fn same_face(&self, a: &SurfacePoint, b: &SurfacePoint) -> bool;
@@ -192,6 +207,11 @@ impl Surface {
     /// The same, faster for the point `on_surface` of the surface that is known to be near: nothing farther is looked at.
     pub fn project_signed_from(&self, point: &Point, on_surface: &Point) -> (SurfacePoint, f64) {
         self.kind.project_signed(point, (point - on_surface).norm())
+    }
+
+    /// What the point `at` lies on, which is nearest to the point `from` outside; None on surfaces that are curved.
+    pub fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<Facing> {
+        self.kind.facing(at, from)
     }
 
     /// The contact of a ball of radius `tip_radius` that touches the surface near `near` and penetrates nowhere; its

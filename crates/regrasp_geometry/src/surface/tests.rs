@@ -1,6 +1,7 @@
 //! Surfaces against brute force, closed forms and each other.
 
 use super::*;
+use crate::ConvexHull;
 use crate::frame::Vector;
 use nalgebra::Unit;
 use std::f64::consts::PI;
@@ -462,3 +463,44 @@ fn bad_lengths_are_refused() {
 }
 
 mod geodesics;
+
+/// What is nearest stays so, as a plane, a line or a point, when the point that sees it moves a little.
+#[test]
+fn what_is_nearest_is_a_face_an_edge_or_a_corner() {
+    let half_extents = Vector::new(0.03, 0.02, 0.01);
+    let corners: Vec<Point> = (0..8)
+        .map(|k| Vector::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - Vector::repeat(1.0))
+        .map(|sign| Point::from(sign.component_mul(&half_extents)))
+        .collect();
+    let mut rng = Rng::keyed(3, "facing", 0);
+    for shape in [Shape::Cuboid { half_extents }, Shape::Convex(ConvexHull::new(&corners).unwrap().into())] {
+        let surface = Surface::of(&shape).unwrap();
+        let mut seen = [0; 3];
+        for _ in 0..300 {
+            let from = Point::from(Vector::from(rng.direction()).component_mul(&Vector::repeat(0.05)));
+            let (foot, distance) = surface.project_signed(&from);
+            if distance < 1e-3 {
+                continue;
+            }
+            let facing = surface.facing(&foot, &from).unwrap();
+            let nudge = Vector::from(rng.direction()) * 1e-6;
+            let (moved, _) = surface.project_signed(&(from + nudge));
+            let way = moved.point_in_object - foot.point_in_object;
+            let expected = match facing {
+                Facing::Face(normal) => nudge - normal.as_ref() * normal.dot(&nudge),
+                Facing::Edge(along) => along.as_ref() * along.dot(&nudge),
+                Facing::Corner => Vector::zeros(),
+            };
+            seen[match facing {
+                Facing::Face(_) => 0,
+                Facing::Edge(_) => 1,
+                Facing::Corner => 2,
+            }] += 1;
+            assert!((way - expected).norm() < 1e-12, "{shape:?}: {facing:?} {way} {expected}");
+        }
+        assert!(seen.iter().all(|n| *n > 10), "{seen:?}");
+    }
+    let sphere = Surface::of(&Shape::Sphere { radius: 0.03 }).unwrap();
+    let from = Point::new(0.05, 0.0, 0.0);
+    assert!(sphere.facing(&sphere.project(&from), &from).is_none());
+}

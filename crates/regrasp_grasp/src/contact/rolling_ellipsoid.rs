@@ -51,16 +51,26 @@ impl Touch {
     /// The touch of a tip at `stance`, whose normal is the first guess. None inside the object, and where guesses do not
     /// settle: in hollows narrower than the tip is curved.
     pub fn of<'a>(surface: &Surface, tip: impl Into<CurvedTip<'a>>, stance: &Stance) -> Option<Self> {
+        Touch::near(surface, tip, stance, None)
+    }
+
+    /// The same, faster where a point of the surface near the touch is known.
+    pub fn near<'a>(
+        surface: &Surface,
+        tip: impl Into<CurvedTip<'a>>,
+        stance: &Stance,
+        known: Option<&Point>,
+    ) -> Option<Self> {
         match tip.into() {
-            CurvedTip::Ellipsoid(tip) => Touch::of_ellipsoid(surface, tip, stance),
-            CurvedTip::Smooth(tip) => touch_smooth::touch(surface, tip, stance),
+            CurvedTip::Ellipsoid(tip) => Touch::of_ellipsoid(surface, tip, stance, known),
+            CurvedTip::Smooth(tip) => touch_smooth::touch(surface, tip, stance, known),
         }
     }
 
-    fn of_ellipsoid(surface: &Surface, tip: &TipEllipsoid, stance: &Stance) -> Option<Self> {
+    fn of_ellipsoid(surface: &Surface, tip: &TipEllipsoid, stance: &Stance, known: Option<&Point>) -> Option<Self> {
         let inner = 0.5 * (tip.flattest() + tip.sharpest());
         let mut stance = *stance;
-        let mut known: Option<Point> = None;
+        let mut known = known.copied();
         for _ in 0..MAX_GUESSES {
             let touching = stance.center + stance.arm(tip);
             let middle = touching + stance.normal * inner;

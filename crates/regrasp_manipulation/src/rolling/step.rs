@@ -8,8 +8,9 @@ use crate::model::{FingerModel, Model};
 use crate::rolling::follow::ik_settings;
 use crate::tolerances::SLIP_TOLERANCE;
 use regrasp_geometry::collision::Placement;
+use regrasp_geometry::frame::tangents;
 use regrasp_geometry::surface::{Surface, SurfacePoint};
-use regrasp_geometry::{UnitVector, Vector};
+use regrasp_geometry::{Point, UnitVector, Vector};
 use regrasp_grasp::Contact;
 use regrasp_grasp::contact::rolling::{Ball, Touch, slip, turn_between};
 use regrasp_grasp::contact::rolling_ellipsoid;
@@ -32,6 +33,13 @@ const PARTS_ON_MESH: usize = 6;
 /// the next change is a quarter of it.
 const MOST_PARTS: usize = 32;
 const SETTLED: f64 = 1.0;
+
+/// How much deeper than where it touches a tip may lie in the object elsewhere, in metres: where it is deeper, nobody knows which of
+/// the two places holds.
+const DEEPER: f64 = 8e-5;
+/// Tilts of the normal, in two directions across it, from which other touches are sought.
+const ASIDE: [(f64, f64); 8] =
+    [(0.06, 0.0), (-0.06, 0.0), (0.0, 0.06), (0.0, -0.06), (0.2, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.2)];
 
 /// Share of the way to the preferred direction that one step of a redundant finger takes: less than where contacts are
 /// fixed, as the tip rolls with it.
@@ -77,10 +85,23 @@ struct Touching {
 }
 
 impl Touching {
+    fn near(&self) -> Near {
+        Near { normal: self.stance.normal, foot: Some(self.foot.point_in_object) }
+    }
+
     fn contact(&self) -> Contact {
         let normal_in_object = UnitVector::new_unchecked(self.stance.normal);
         Contact { point_in_object: self.foot.point_in_object, normal_in_object }
     }
+}
+
+/// Where a touch is sought.
+#[derive(Debug, Clone, Copy)]
+struct Near {
+    /// A normal near its, in the object frame.
+    normal: Vector,
+    /// A point of the surface near by, where one is known.
+    foot: Option<Point>,
 }
 
 /// What is left of a motion when rolling is taken off.
@@ -100,6 +121,8 @@ pub struct RollStep<'a> {
     model: &'a Model<'a>,
     finger: usize,
     start: Stance,
+    /// Where it touches at the start.
+    foot: Point,
     joints: &'a Coordinates,
     to: &'a Placement,
 }
@@ -122,7 +145,14 @@ impl<'a> RollStep<'a> {
             None => contact.point_in_object + normal * of_hand.tip_radius,
             Some(_) => from.point_to_child(&link.point(of_hand.ik.center_in_body())),
         };
-        RollStep { model, finger, start: Stance { center, object_from_link, normal }, joints, to }
+        RollStep {
+            model,
+            finger,
+            start: Stance { center, object_from_link, normal },
+            foot: contact.point_in_object,
+            joints,
+            to,
+        }
     }
 
     /// What is asked of the joints; a redundant finger may also turn towards the inward normal.
@@ -137,9 +167,18 @@ impl<'a> RollStep<'a> {
         IkSettings { preference, max_step, ..settings }
     }
 
-    /// Where the tip is, with the link at `link` and the object at `object`.
-    fn touch(&self, link: &BodyFrame, object: &Placement) -> Option<Touching> {
-        self.model.fingers[self.finger].touch(&self.model.view.object.surface, link, object, &self.start.normal)
+    /// Where the tip is, with the link at `link` and the object at `object`; where it may be nearly flat, near where it touched
+    /// last.
+    fn touch(&self, link: &BodyFrame, object: &Placement, last: &Near) -> Option<Touching> {
+        let finger = &self.model.fingers[self.finger];
+        let start = Near { normal: self.start.normal, foot: None };
+        let near = if matches!(finger.curved, Some(CurvedTip::Smooth(_))) { last } else { &start };
+        finger.touch(&self.model.view.object.surface, link, object, near)
+    }
+
+    /// Where it touches at the start.
+    fn first(&self) -> Near {
+        Near { normal: self.start.normal, foot: Some(self.foot) }
     }
 
     /// Turn of the tip over the object about the normal from one stance to the other.
@@ -167,9 +206,10 @@ impl<'a> RollStep<'a> {
     fn solve(&self, near: &Coordinates, settings: &IkSettings, error: &Slipped) -> Option<Rolled> {
         let finger = &self.model.fingers[self.finger];
         let turns_along = self.model.resists_spin(self.finger) && finger.ik.is_redundant();
-        let mut end = None;
+        let mut end: Option<Touching> = None;
+        let first = self.first();
         let asked = |link: &BodyFrame| {
-            let touch = self.touch(link, self.to)?;
+            let touch = self.touch(link, self.to, &end.as_ref().map_or(first, Touching::near))?;
             let normal = touch.stance.normal;
             let slipped = self.slip(&self.start, &touch.stance) + error.way;
             let off = slipped - normal * normal.dot(&slipped) + normal * touch.gap;
@@ -210,6 +250,9 @@ impl<'a> RollStep<'a> {
         for correction in 0..=CORRECTIONS {
             let left = self.slip_over_parts(&end, &between, allowed).ok_or(NoStep::TooLong)?;
             if left.way.norm() <= STEP_SLIP && (!turns_along || left.spin.abs() <= STEP_SPIN) {
+                if self.is_deeper_elsewhere(&end) {
+                    return Err(NoStep::OutOfReach);
+                }
                 return Ok(Rolled { spin: left.spin, halfway: left.halfway, ..end });
             }
             if correction < CORRECTIONS {
@@ -219,6 +262,24 @@ impl<'a> RollStep<'a> {
             }
         }
         Err(NoStep::TooLong)
+    }
+
+    /// True where a tip that may be nearly flat, on a mesh that may have dents, is found to lie deeper in the object at another
+    /// place than where it touches: its other touches are sought from normals aside.
+    fn is_deeper_elsewhere(&self, end: &Rolled) -> bool {
+        let finger = &self.model.fingers[self.finger];
+        let surface = &self.model.view.object.surface;
+        if surface.mesh().is_none() || !matches!(finger.curved, Some(CurvedTip::Smooth(_))) {
+            return false;
+        }
+        let normal = end.contact.normal_in_object;
+        let link = finger.ik.chain().last_frame(&end.joints);
+        let (x, y) = tangents(&normal);
+        ASIDE.iter().any(|&(along_x, along_y)| {
+            let normal = (normal.as_ref() + x.as_ref() * along_x + y.as_ref() * along_y).normalize();
+            let near = Near { normal, foot: Some(end.foot.point_in_object) };
+            self.touch(&link, self.to, &near).is_some_and(|touch| touch.gap < -DEEPER)
+        })
     }
 
     /// Slip over parts of the step, while the joints move linearly: what the rule over the whole of it leaves out. None where
@@ -254,7 +315,7 @@ impl<'a> RollStep<'a> {
     ) -> Option<Slipped> {
         let finger = &self.model.fingers[self.finger];
         let chain = finger.ik.chain();
-        let mut before = self.start;
+        let (mut before, mut last_near) = (self.start, self.first());
         let mut halfway = None;
         let mut sum = Slipped::default();
         let mut add = |from: &Stance, to: &Stance| {
@@ -264,7 +325,7 @@ impl<'a> RollStep<'a> {
         for k in 1..n_parts {
             let t = k as f64 / n_parts as f64;
             let joints: Coordinates = self.joints.iter().zip(&end.joints).map(|(a, b)| a + t * (b - a)).collect();
-            let touch = self.touch(&chain.last_frame(&joints), &between(t))?;
+            let touch = self.touch(&chain.last_frame(&joints), &between(t), &last_near)?;
             let facing = -touch.stance.object_from_link.tr_mul(&touch.stance.normal);
             if touch.gap.abs() > allowed || finger.pad.is_some_and(|pad| !pad.holds(&facing)) {
                 return None;
@@ -273,7 +334,7 @@ impl<'a> RollStep<'a> {
                 halfway = Some(touch.contact());
             }
             add(&before, &touch.stance);
-            before = touch.stance;
+            (before, last_near) = (touch.stance, touch.near());
         }
         let last = RollStep::new(self.model, self.finger, &end.contact, &end.joints, self.to, self.to).start;
         add(&before, &last);
@@ -282,10 +343,10 @@ impl<'a> RollStep<'a> {
 }
 
 impl FingerModel<'_> {
-    /// Where the tip is over the object's surface, with the link at `link` and the object at `object`; the normal is sought
-    /// near `normal`, in the object frame.
+    /// Where the tip is over the object's surface, with the link at `link` and the object at `object`; the touch of tips that are
+    /// no balls is sought near `last`.
     #[inline]
-    fn touch(&self, surface: &Surface, link: &BodyFrame, object: &Placement, normal: &Vector) -> Option<Touching> {
+    fn touch(&self, surface: &Surface, link: &BodyFrame, object: &Placement, last: &Near) -> Option<Touching> {
         let center = object.point_to_child(&link.point(self.ik.center_in_body()));
         let object_from_link = object.rotation.tr_mul(&link.rotation);
         match self.curved {
@@ -295,8 +356,8 @@ impl FingerModel<'_> {
                 Some(Touching { stance, foot: touch.foot, gap: touch.distance - self.tip_radius })
             }
             Some(tip) => {
-                let stance = Stance { center, object_from_link, normal: *normal };
-                let touch = rolling_ellipsoid::Touch::of(surface, tip, &stance)?;
+                let stance = Stance { center, object_from_link, normal: last.normal };
+                let touch = rolling_ellipsoid::Touch::near(surface, tip, &stance, last.foot.as_ref())?;
                 Some(Touching { stance: touch.stance, foot: touch.foot, gap: touch.gap })
             }
         }
@@ -313,7 +374,8 @@ impl FingerModel<'_> {
             let point_in_object = center - normal_in_object.into_inner() * self.tip_radius;
             return Some((Contact { point_in_object, normal_in_object }, distance - self.tip_radius));
         }
-        let touching = self.touch(surface, &link, object, &normal_in_object)?;
+        let near = Near { normal: normal_in_object.into_inner(), foot: Some(foot.point_in_object) };
+        let touching = self.touch(surface, &link, object, &near)?;
         let mut contact = touching.contact();
         contact.point_in_object += touching.stance.normal * touching.gap;
         Some((contact, touching.gap))

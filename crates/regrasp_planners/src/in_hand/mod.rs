@@ -102,6 +102,7 @@ pub fn plan_in_hand(
 /// As [`plan_in_hand`], with the query and the answer in the hand's frame.
 fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget) -> Result<Plan, Failure> {
     let mut spent = 0;
+    let mut missed = Vec::new();
     let gives_start = asked.query.start_grasp != GraspRequest::Automatic;
     for (first, work) in first_try::first_tries(asked.view, settings, budget, gives_start) {
         let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
@@ -111,7 +112,10 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
                 return Ok(Plan { settings: record::settings_of(settings), ..plan });
             }
             Err(failure) if failure.kind == FailureKind::Interrupted => return Err(failure),
-            Err(failure) => spent += failure.statistics.work,
+            Err(failure) => {
+                spent += failure.statistics.work;
+                missed.push(failure);
+            }
         }
     }
     let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
@@ -119,6 +123,7 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
     let (Ok(Plan { statistics, .. }) | Err(Failure { statistics, .. })) = &mut found;
     statistics.work += spent;
     if let Err(failure) = &mut found {
+        first_try::tell(failure, missed);
         let model = Model::new(asked.view, &effective(settings).within(&asked.view.limits).physics);
         let ends = [&asked.query.world_from_object_start, &asked.query.world_from_object_goal];
         friction::advise(&model, ends, asked.seed, failure);

@@ -1,9 +1,16 @@
 //! Where a smooth convex tip touches, when its curvature changes from that of a rim to that of a flat face within degrees.
 //!
 //! A guess of the normal `n` says which point of the tip faces the object. From a little inside the tip, behind that point, the
-//! nearest point of the object gives another normal. Where both agree the tip touches. Newton's method finds it: the tip's
-//! radii of curvature say how the point moves over the tip when the normal turns, and two nudges how the nearest point of the
-//! object moves, on faces, edges and corners alike.
+//! nearest point of the object gives another normal. Where both agree the tip touches.
+//!
+//! Where the object is made of flat faces, the normal is sought with which the tip would touch the face, edge or corner that is
+//! nearest now, as if there were no other. Mostly that is where it touches; else what is nearest then is the next guess. Where
+//! that does not bring the normals nearer to each other, and on curved objects, Newton's method finds the touch: the tip's radii
+//! of curvature say how the point moves over the tip when the normal turns, and two nudges how the nearest point of the object
+//! moves, on faces, edges and corners alike.
+
+/// The touch of a face, edge or corner alone.
+mod alone;
 
 use super::{Stance, Touch};
 use nalgebra::{Matrix2, Vector2};
@@ -17,6 +24,8 @@ const INNER: f64 = 1e-3;
 /// Steps of Newton's method, and how often a step is halved.
 const MOST_STEPS: usize = 40;
 const MOST_HALVINGS: usize = 10;
+/// How often a step towards the touch of what is nearest alone is halved.
+const HALVINGS_ALONE: usize = 3;
 /// Longest step, in radians.
 const LONGEST_STEP: f64 = 0.4;
 /// Nudges of the point that the object is seen from, in metres.
@@ -37,23 +46,30 @@ struct Seen {
 }
 
 /// The touch of `tip` at `stance`, whose normal is the first guess; None inside the object, and where guesses do not settle.
-pub(super) fn touch(surface: &Surface, tip: &SmoothHull, stance: &Stance) -> Option<Touch> {
+/// `near` is a point of the surface near by, where one is known.
+pub(super) fn touch(surface: &Surface, tip: &SmoothHull, stance: &Stance, near: Option<&Point>) -> Option<Touch> {
     let turn = stance.object_from_link;
-    let see = |normal: Vector, known: Option<&Seen>| {
+    let see = |normal: Vector, known: Option<&Point>| -> Option<Seen> {
         let from = stance.center + turn * tip.point(&-turn.tr_mul(&normal)) + normal * INNER;
         let (foot, distance) = match known {
-            Some(known) => surface.project_signed_from(&from, &known.foot.point_in_object),
+            Some(known) => surface.project_signed_from(&from, known),
             None => surface.project_signed(&from),
         };
         let off = (distance > 1e-9).then(|| (from - foot.point_in_object) / distance - normal)?;
         Some(Seen { normal, from, foot, off })
     };
-    let mut now = see(stance.normal, None)?;
+    let mut now = see(stance.normal, near)?;
     let mut slope: Option<Slope> = None;
     for _ in 0..MOST_STEPS {
         let left = now.off.norm();
         if left < AGREED {
             return Some(touch_of(stance, &now));
+        }
+        if slope.is_none()
+            && let Some(next) = nearer_alone(surface, tip, stance, &now, &see)
+        {
+            now = next;
+            continue;
         }
         let known = slope.take();
         let is_known = known.is_some();
@@ -65,7 +81,7 @@ pub(super) fn touch(surface: &Surface, tip: &SmoothHull, stance: &Stance) -> Opt
         let mut share = (LONGEST_STEP / step.norm()).min(1.0);
         let halvings = if is_known { 1 } else { MOST_HALVINGS };
         let better = (0..halvings).find_map(|_| {
-            let next = see((now.normal + step * share).normalize(), Some(&now));
+            let next = see((now.normal + step * share).normalize(), Some(&now.foot.point_in_object));
             share *= 0.5;
             next.filter(|next| next.off.norm() < left)
         });
@@ -84,6 +100,26 @@ pub(super) fn touch(surface: &Surface, tip: &SmoothHull, stance: &Stance) -> Opt
         }
     }
     None
+}
+
+/// What is seen with the normal with which the tip would touch what is nearest alone, or part of the way there, where the normals
+/// agree better then.
+fn nearer_alone(
+    surface: &Surface,
+    tip: &SmoothHull,
+    stance: &Stance,
+    now: &Seen,
+    see: &impl Fn(Vector, Option<&Point>) -> Option<Seen>,
+) -> Option<Seen> {
+    let facing = surface.facing(&now.foot, &now.from)?;
+    let normal = alone::normal(tip, &Stance { normal: now.normal, ..*stance }, &facing, &now.foot.point_in_object)?;
+    let step = normal - now.normal;
+    let mut share = (LONGEST_STEP / step.norm()).min(1.0);
+    (0..HALVINGS_ALONE).find_map(|_| {
+        let next = see((now.normal + step * share).normalize(), Some(&now.foot.point_in_object));
+        share *= 0.5;
+        next.filter(|next| next.off.norm() < now.off.norm())
+    })
 }
 
 fn touch_of(stance: &Stance, seen: &Seen) -> Touch {
@@ -174,13 +210,18 @@ mod tests {
     fn gaps_are_what_separating_planes_say() {
         let tip = bar();
         let cuboid = Vector::new(0.03, 0.02, 0.025);
-        let shapes: [(Shape, Reach); 3] = [
+        let mut rng = Rng::keyed(5, "corners", 0);
+        let corners: Vec<Point> =
+            (0..300).map(|_| Point::from(Vector::from(rng.direction()).component_mul(&cuboid))).collect();
+        let stone = Shape::Convex(ConvexHull::new(&corners).unwrap().into());
+        let shapes: [(Shape, Reach); 4] = [
             (Shape::Sphere { radius: 0.032 }, Box::new(|n: &Vector| 0.032 * n.norm())),
             (Shape::Cuboid { half_extents: cuboid }, Box::new(move |n: &Vector| n.abs().dot(&cuboid))),
             (
                 Shape::Cylinder { half_length: 0.035, radius: 0.02 },
                 Box::new(|n: &Vector| 0.035 * n.z.abs() + 0.02 * n.xy().norm()),
             ),
+            (stone, Box::new(move |n: &Vector| corners.iter().map(|p| p.coords.dot(n)).fold(0.0, f64::max))),
         ];
         let mut rng = Rng::keyed(5, "gaps", 0);
         for (shape, reach) in &shapes {
@@ -191,13 +232,13 @@ mod tests {
                 let apart = |n: &Vector, stance: &Stance| {
                     stance.center.coords.dot(n) - tip.support(&-stance.object_from_link.tr_mul(n)) - reach(n)
                 };
-                let Some(far) = touch(&surface, &tip, &stance) else {
+                let Some(far) = touch(&surface, &tip, &stance, None) else {
                     missed += 1;
                     continue;
                 };
                 // The same, pressed in by a fifth of a millimetre.
                 stance.center -= far.stance.normal * (far.gap + 0.2e-3);
-                for touch in [Some(far), touch(&surface, &tip, &Stance { normal: far.stance.normal, ..stance })] {
+                for touch in [Some(far), touch(&surface, &tip, &Stance { normal: far.stance.normal, ..stance }, None)] {
                     let Some(touch) = touch else {
                         missed += 1;
                         continue;

@@ -77,7 +77,11 @@ impl Left {
         });
         let nearest_miss = nearest_miss.map(Box::new);
         let end = if self.leg + 1 == n_legs { "the goal".to_owned() } else { format!("way pose {}", self.leg + 1) };
-        let reached = nearest_miss.as_ref().map_or("no grasp was found at the start pose".to_owned(), |miss| {
+        let no_grasp = match interrupt {
+            Interrupt::WorkSpent => "no grasp was found at the start pose",
+            Interrupt::Deadline | Interrupt::Cancelled => "no grasp was found at the start pose before that",
+        };
+        let reached = nearest_miss.as_ref().map_or(no_grasp.to_owned(), |miss| {
             format!(
                 "the object came within {:.1} degrees and {:.1} mm of {end}",
                 miss.angle_left.to_degrees(),

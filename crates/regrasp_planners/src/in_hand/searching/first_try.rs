@@ -5,8 +5,10 @@ use crate::settings::{InHandSettings, Method, SearchSettings};
 use regrasp_base::Budget;
 use regrasp_geometry::collision::support::support_value;
 use regrasp_geometry::{Vector, frame};
+use regrasp_manipulation::failure::Failure;
 use regrasp_manipulation::settings::PhysicsSettings;
 use regrasp_robot::Finger;
+use regrasp_robot::tip::CurvedTip;
 use regrasp_scene::HandView;
 
 /// Directions across a link in which its width is measured.
@@ -14,6 +16,10 @@ const DIRECTIONS: usize = 32;
 
 /// Share of the work for the try that asks for both; by hand.
 const SHARE_FOR_BOTH: f64 = 1.0 / 3.0;
+
+/// How many times longer the same work takes where fingertips that are meshes roll on meshes: with all of it, tries would take up
+/// to a minute there. Measured on scans in the LEAP hand: 135 to 190 microseconds a configuration, where the Allegro's balls take 3.
+const LONGER: u64 = 16;
 
 /// Settings and work of what is tried first, in order; none where there is nothing to try: more clearance and more closure, and
 /// more clearance alone.
@@ -30,6 +36,7 @@ pub fn first_tries(
         true => wanted.work.min(settings.search.courses_work.saturating_mul(2)),
         false => wanted.work,
     };
+    let most_work = if takes_long(view) { most_work / LONGER } else { most_work };
     let can_keep = |finger: &Finger| stand_back(finger).is_none_or(|back| back >= 2.0 * wanted.clearance);
     let keeps_away = wanted.clearance > settings.physics.clearance && view.hand.fingers.iter().all(can_keep);
     let closes_more = wanted.closure_margin > settings.physics.closure_margin;
@@ -46,6 +53,26 @@ pub fn first_tries(
         (false, false) => Vec::new(),
         (keeps_away, closes_more) => vec![with(keeps_away, closes_more, 1.0)],
     }
+}
+
+/// Says in the failure of the usual search how near first tries came that `missed` too, where they came nearer on the same leg.
+pub fn tell(failure: &mut Failure, missed: Vec<Failure>) {
+    let own = failure.nearest_miss.as_ref().map_or(f64::INFINITY, |miss| miss.angle_left);
+    let same_leg = missed.into_iter().filter(|tried| tried.leg == failure.leg).filter_map(|tried| tried.nearest_miss);
+    let nearest = same_leg.min_by(|a, b| a.angle_left.total_cmp(&b.angle_left));
+    let Some(nearest) = nearest.filter(|nearest| nearest.angle_left < own) else { return };
+    failure.message.push_str(&format!(
+        "; a first try with more clearance came within {:.1} degrees and {:.1} mm",
+        nearest.angle_left.to_degrees(),
+        nearest.distance_left * 1e3
+    ));
+    failure.nearest_miss = Some(nearest);
+}
+
+/// True where fingertips that are meshes roll on a mesh.
+fn takes_long(view: &HandView) -> bool {
+    let is_smooth = |finger: &Finger| matches!(finger.tip.curved(), Some(CurvedTip::Smooth(_)));
+    view.object.surface.mesh().is_some() && view.hand.fingers.iter().any(is_smooth)
 }
 
 /// How far the link behind a round tip stands back behind it where it is thinnest, in metres: no finger keeps its last link
@@ -76,6 +103,8 @@ fn stand_back(finger: &Finger) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::settings::FirstTry;
+    use regrasp_manipulation::failure::{FailureKind, NearestMiss};
+    use regrasp_plan::plan::PoseData;
     use regrasp_robot::LoadOptions;
 
     #[test]
@@ -109,5 +138,32 @@ mod tests {
         let nearer = FirstTry { clearance: 0.0005, work: 90, ..wanted };
         let both = [(0.0005, wanted.closure_margin, 30), (0.0005, usual.physics.closure_margin, 90)];
         assert_eq!(asked(&with(nearer)), both);
+    }
+
+    #[test]
+    fn failures_tell_of_first_tries_that_came_nearer() {
+        let missed = |leg: Option<usize>, degrees: Option<f64>| {
+            let mut failure = Failure::bare(FailureKind::TimeLimit, "no plan", "allow more time");
+            failure.leg = leg;
+            failure.nearest_miss = degrees.map(|degrees| {
+                Box::new(NearestMiss {
+                    world_from_object: PoseData::from(&regrasp_geometry::Pose::identity()),
+                    angle_left: f64::to_radians(degrees),
+                    distance_left: 0.001,
+                    joints: vec![],
+                })
+            });
+            failure
+        };
+        let left = |failure: &Failure| failure.nearest_miss.as_ref().map(|miss| miss.angle_left.to_degrees().round());
+        let tries =
+            || vec![missed(None, Some(40.0)), missed(None, None), missed(None, Some(30.0)), missed(Some(1), Some(5.0))];
+        let mut never_began = missed(None, None);
+        tell(&mut never_began, tries());
+        assert_eq!(left(&never_began), Some(30.0));
+        assert_eq!(never_began.message, "no plan; a first try with more clearance came within 30.0 degrees and 1.0 mm");
+        let mut nearer = missed(None, Some(20.0));
+        tell(&mut nearer, tries());
+        assert_eq!((left(&nearer), nearer.message.as_str()), (Some(20.0), "no plan"));
     }
 }
