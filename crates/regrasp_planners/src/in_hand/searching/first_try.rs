@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn failures_tell_of_first_tries_that_came_nearer() {
         let missed = |leg: Option<usize>, degrees: Option<f64>| {
-            let mut failure = Failure::bare(FailureKind::TimeLimit, "no plan", "allow more time");
+            let mut failure = Failure::bare(FailureKind::TimeLimit, "no plan".into(), "allow more time");
             failure.leg = leg;
             failure.nearest_miss = degrees.map(|degrees| {
                 Box::new(NearestMiss {
