@@ -61,9 +61,9 @@ struct Campaign {
     seeds: u64,
 }
 
-/// Measures the cells that have no rows yet, `AT_ONCE` at a time (1) and `CELLS` at most, and writes the page: `place` searches on all cores
-/// and stops by the clock, so that two cells at once get worse poses (LEAP with a mug: none of 5 plans in place of 4). With the argument `page` only
-/// the page. Other arguments are the hands to measure; none are all.
+/// Measures the cells that have no rows yet, `CELLS` at most, and writes the page; with the argument `page` only the page. One cell at
+/// a time, or `AT_ONCE`: `place` searches on all cores and stops by the clock, so that two at once get worse poses (LEAP with a mug:
+/// none of 5 plans in place of 4). Other arguments are the hands to measure; none are all.
 pub fn task(arguments: &[String]) -> Outcome {
     let known = read_rows()?;
     if arguments.first().is_none_or(|word| word != "page") {

@@ -98,7 +98,7 @@ impl Touching {
 /// Where a touch is sought.
 #[derive(Debug, Clone, Copy)]
 struct Near {
-    /// A normal near its, in the object frame.
+    /// A guess of its normal, in the object frame.
     normal: Vector,
     /// A point of the surface near by, where one is known.
     foot: Option<Point>,

@@ -5,11 +5,14 @@ use crate::in_hand::attempt::tally::Tally;
 use rayon::prelude::*;
 use regrasp_base::Interrupt;
 use regrasp_geometry::{Pose, frame};
-use regrasp_manipulation::failure::{Failure, NearestMiss};
+use regrasp_manipulation::failure::{Failure, FailureKind, NearestMiss};
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::outline::Outline;
 use regrasp_plan::plan::{PoseData, Statistics};
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Advice where no search found a grasp.
+pub const MOVE_THE_START: &str = "move the start pose to where the fingers reach around the object";
 
 /// What an attempt left behind, whether it succeeded or not.
 #[derive(Debug, Default, Clone)]
@@ -81,22 +84,15 @@ impl Left {
             Interrupt::WorkSpent => "no grasp was found at the start pose",
             Interrupt::Deadline | Interrupt::Cancelled => "no grasp was found at the start pose before that",
         };
-        let reached = nearest_miss.as_ref().map_or(no_grasp.to_owned(), |miss| {
-            format!(
-                "the object came within {:.1} degrees and {:.1} mm of {end}",
-                miss.angle_left.to_degrees(),
-                miss.distance_left * 1e3
-            )
-        });
+        let reached = nearest_miss
+            .as_ref()
+            .map_or(no_grasp.to_owned(), |miss| format!("the object came {} of {end}", within(miss)));
         let bound = self.tally.bound_fingers(model).map_or(String::new(), |bound| format!("; {bound}"));
         let in_the_way = self.tally.tried.in_words(model);
         let leg = (n_legs > 1).then_some(self.leg + 1);
         let where_stuck = leg.map_or(String::new(), |leg| format!("leg {leg} of {n_legs} failed: "));
         let causes = self.tally.causes(model);
-        let more = match interrupt {
-            Interrupt::WorkSpent => "allow more work (--max-work, max_work)",
-            Interrupt::Deadline | Interrupt::Cancelled => "allow more time (--time-limit, time_limit)",
-        };
+        let more = allow_more(interrupt.into());
         let advice = match (self.tally.weak_joints(model), causes.first()) {
             (Some(weak), _) => format!("lower the mass of the object, or use stronger motors: {weak}"),
             _ if in_the_way.is_some() => {
@@ -105,7 +101,7 @@ impl Left {
                     .into()
             }
             (None, Some(cause)) if nearest_miss.is_none() => {
-                format!("move the start pose to where the fingers reach around the object (mostly: {})", cause.reason)
+                format!("{MOVE_THE_START} (mostly: {})", cause.reason)
             }
             (None, Some(cause)) => format!("{more}, or ease what stops it most: {}", cause.reason),
             (None, None) => more.into(),
@@ -148,6 +144,19 @@ impl Left {
         {
             self.nearest = other.nearest;
         }
+    }
+}
+
+/// How far the object was from where it should go.
+pub fn within(miss: &NearestMiss) -> String {
+    format!("within {:.1} degrees and {:.1} mm", miss.angle_left.to_degrees(), miss.distance_left * 1e3)
+}
+
+/// What helps a search that had too little time, or too little work.
+pub fn allow_more(kind: FailureKind) -> &'static str {
+    match kind {
+        FailureKind::WorkSpent => "allow more work (--max-work, max_work)",
+        _ => "allow more time (--time-limit, time_limit)",
     }
 }
 

@@ -1,6 +1,7 @@
 //! A first try with links that keep farther from everything than they must, and grasps that hold better: in a hand that
 //! gives, links stray by more than plans keep them away, and what they touch then throws the object.
 
+use super::attempts::{MOVE_THE_START, allow_more, within};
 use crate::settings::{InHandSettings, Method, SearchSettings};
 use regrasp_base::Budget;
 use regrasp_geometry::collision::support::support_value;
@@ -61,11 +62,11 @@ pub fn tell(failure: &mut Failure, missed: Vec<Failure>) {
     let same_leg = missed.into_iter().filter(|tried| tried.leg == failure.leg).filter_map(|tried| tried.nearest_miss);
     let nearest = same_leg.min_by(|a, b| a.angle_left.total_cmp(&b.angle_left));
     let Some(nearest) = nearest.filter(|nearest| nearest.angle_left < own) else { return };
-    failure.message.push_str(&format!(
-        "; a first try with more clearance came within {:.1} degrees and {:.1} mm",
-        nearest.angle_left.to_degrees(),
-        nearest.distance_left * 1e3
-    ));
+    failure.message.push_str(&format!("; a first try, which asks for more (first_try), came {}", within(&nearest)));
+    if failure.advice.starts_with(MOVE_THE_START) {
+        // It found grasps there.
+        failure.advice = allow_more(failure.kind).into();
+    }
     failure.nearest_miss = Some(nearest);
 }
 
@@ -103,9 +104,12 @@ fn stand_back(finger: &Finger) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::settings::FirstTry;
+    use regrasp_geometry::{ConvexHull, Point};
     use regrasp_manipulation::failure::{FailureKind, NearestMiss};
     use regrasp_plan::plan::PoseData;
     use regrasp_robot::LoadOptions;
+    use regrasp_robot::tip::smooth_hull::SmoothHull;
+    use regrasp_robot::tip::{HullSurface, TipShape};
 
     #[test]
     fn the_wide_hand_stands_back_by_what_its_urdf_says() {
@@ -141,6 +145,37 @@ mod tests {
     }
 
     #[test]
+    fn fingertips_that_are_meshes_on_a_mesh_have_a_sixteenth() {
+        let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        let sphere = "sphere = { radius = 0.032 }";
+        let usual = std::fs::read_to_string(scenes.join("sphere_90x.toml")).unwrap();
+        let cube: Vec<Point> =
+            (0..8).map(|k| Point::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 0.01).collect();
+        let cube = ConvexHull::new(&cube.iter().map(|p| p - Vector::repeat(0.005)).collect::<Vec<_>>()).unwrap();
+        let (surface, misfit) = SmoothHull::near(&cube, None).unwrap();
+        let tries = |object: &str, has_mesh_tip: bool| -> Vec<u64> {
+            assert!(usual.contains(sphere));
+            let bytes = usual.replace(sphere, object).into_bytes();
+            let path = scenes.join("stone.toml");
+            let mut loaded = regrasp_scene::load_scene_text(&path, bytes, &LoadOptions::default()).unwrap();
+            if has_mesh_tip {
+                loaded.scene.hands[0].hand.fingers[2].tip.shape = TipShape::Hull {
+                    hull: cube.clone().into(),
+                    surface: HullSurface::Smooth(surface.clone().into()),
+                    misfit,
+                    elements: vec![],
+                };
+            }
+            let tries = first_tries(&loaded.view(), &InHandSettings::default(), &Budget::work(10_000_000), false);
+            assert!(!tries.is_empty());
+            tries.into_iter().map(|(_, work)| work).collect()
+        };
+        let mesh = "mesh = { file = \"../assets/objects/icosahedron.obj\" }";
+        assert_eq!(tries(mesh, false), tries(sphere, false));
+        assert_eq!(tries(mesh, true), tries(sphere, true).iter().map(|work| work / 16).collect::<Vec<u64>>());
+    }
+
+    #[test]
     fn failures_tell_of_first_tries_that_came_nearer() {
         let missed = |leg: Option<usize>, degrees: Option<f64>| {
             let mut failure = Failure::bare(FailureKind::TimeLimit, "no plan".into(), "allow more time");
@@ -161,7 +196,13 @@ mod tests {
         let mut never_began = missed(None, None);
         tell(&mut never_began, tries());
         assert_eq!(left(&never_began), Some(30.0));
-        assert_eq!(never_began.message, "no plan; a first try with more clearance came within 30.0 degrees and 1.0 mm");
+        assert_eq!(
+            never_began.message,
+            "no plan; a first try, which asks for more (first_try), came within 30.0 degrees and 1.0 mm"
+        );
+        let mut misled = Failure { advice: format!("{MOVE_THE_START} (mostly: out of reach)"), ..missed(None, None) };
+        tell(&mut misled, tries());
+        assert_eq!(misled.advice, "allow more time (--time-limit, time_limit)");
         let mut nearer = missed(None, Some(20.0));
         tell(&mut nearer, tries());
         assert_eq!((left(&nearer), nearer.message.as_str()), (Some(20.0), "no plan"));
