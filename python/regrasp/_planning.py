@@ -40,6 +40,7 @@ def plan(
     settings: Mapping[str, Any] | None = None,
     level: Level = "motion",
     task: str | None = None,
+    hold: bool = False,
     progress: Callable[[Progress], object] | None = None,
 ) -> Plan | Failure:
     """Plans how the hand takes the object from start to goal, and has the plan judged by the independent checker.
@@ -61,6 +62,7 @@ def plan(
     level: what the plan is judged for: "geometry" (poses alone), "forces" (and contact forces) or "motion" (and that nothing
     slips or goes too fast).
     task: name of the task, of a scene with several; the first where nothing is said.
+    hold: asks only whether the object can be held at the start: one grasp, with its forces and margin. Goal and way do not count.
     progress: called now and then, by this thread, with a `Progress`; what it raises stops the search and is raised.
 
     The interpreter's lock is released while the search runs, and Ctrl-C stops it. Raises `InputError`, and `InternalError`
@@ -86,6 +88,7 @@ def plan(
         "settings": None if settings is None else _settings_text(settings),
         "level": level,
         "task": task,
+        "hold": bool(hold),
         "progress": None if progress is None else _listener(progress),
     }
     found, outcome = _regrasp.plan(scene._native, request)
@@ -170,6 +173,7 @@ def _plan_robot(
         "settings": None if settings is None else _settings_text(settings),
         "level": level,
         "task": task,
+        "hold": False,
         "progress": None,
     }
     found, outcome = _regrasp.plan_motion(scene._native, request)
@@ -188,6 +192,7 @@ def place(
     solid: Literal["mesh", "hull"] | None = None,
     torsion_radius: float | None = None,
     alternatives: int = 0,
+    hold: bool = False,
     seed: int = 0,
     time_limit: float | None = None,
     max_work: int = 3_000_000,
@@ -208,6 +213,7 @@ def place(
     solid: what stands for the inside of a mesh: its triangles, or its convex hull, for meshes that are not closed.
     torsion_radius: soft fingertips, where the hand file names no contact model.
     alternatives: scenes of the next best poses, up to 5.
+    hold: looks for poses in which the object can be held at all; turns do not count. `plan(scene, hold=True)` plans such scenes.
     seed, time_limit, max_work: as in `plan`.
     packages: folders of package://NAME/...
 
@@ -232,6 +238,7 @@ def place(
         "solid": solid,
         "torsion_radius": torsion_radius,
         "alternatives": whole("place", "alternatives", alternatives, 0, 5),
+        "hold": bool(hold),
         "seed": seed_of("place", seed),
         "time_limit": seconds("place", "time_limit", time_limit),
         "max_work": whole("place", "max_work", max_work, 0, 2**64 - 1),
@@ -265,6 +272,7 @@ def check(
     lenient: bool = False,
     level: Level = "motion",
     own_query: bool = False,
+    hold: bool = False,
 ) -> Report:
     """Judges a plan in its scene, by the checker that knows no planner.
 
@@ -275,11 +283,12 @@ def check(
     level: as in `plan`. `Report.reached` says which level the plan reaches.
     own_query: a plan of a `Session` brings the start and the goal that it was asked. It is rejected unless this is True, because
     such a plan answers only its own question.
+    hold: the plan was asked only whether the object can be held (`plan(..., hold=True)`).
 
     Raises `InputError` for files that cannot be used. What is wrong with the plan is no exception but in the report.
     """
     plan, scene = _with_scene(plan, scene, packages, lenient)
-    return report_of(json.loads(_regrasp.check(plan._native, scene._native, level, own_query)))
+    return report_of(json.loads(_regrasp.check(plan._native, scene._native, level, own_query, hold)))
 
 
 def export_mjcf(

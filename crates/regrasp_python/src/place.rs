@@ -29,6 +29,7 @@ pub struct Request {
     solid: Option<String>,
     torsion_radius: Option<f64>,
     alternatives: usize,
+    hold: bool,
     seed: u64,
     time_limit: Option<f64>,
     max_work: u64,
@@ -63,8 +64,11 @@ pub fn place(py: Python<'_>, request: Request, options: Options) -> PyResult<(Ve
             let draft = text.text(None);
             let loaded = load_scene_text(&request.output, draft.clone().into_bytes(), &options)
                 .map_err(|error| of_draft(error, &request.output, &draft))?;
-            let queries: Vec<InHandQuery> =
+            let mut queries: Vec<InHandQuery> =
                 loaded.tasks.iter().filter_map(|task| task.query(request.seed).as_in_hand().cloned()).collect();
+            if request.hold {
+                queries = queries.iter().take(1).map(InHandQuery::held).collect();
+            }
             let settings = InHandSettings { n_threads: 1, ..InHandSettings::default() };
             let budget = Budget { max_work: request.max_work, deadline, improve_for: None, cancelled };
             let wanted = (request.seed, 1 + request.alternatives);

@@ -13,7 +13,7 @@ use regrasp::plan::check::{CheckSettings, Level, OwnQuery, Report, check_any, qu
 use regrasp::plan::format;
 use regrasp::scene::Task;
 use regrasp::settings::{Argument, Overrides, SettingsError, settings_for};
-use regrasp::{AnyPlan, Budget, Failure, PlannerSettings};
+use regrasp::{AnyPlan, Budget, Failure, PlannerSettings, Query};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -33,6 +33,7 @@ pub struct Request {
     settings: Option<String>,
     level: String,
     task: Option<String>,
+    hold: bool,
     progress: Option<Py<PyAny>>,
 }
 
@@ -43,7 +44,7 @@ pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option
         let task = scene.task(py, request.task.as_deref())?;
         let level = level_named(&request.level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let settings = settings(task, &request).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
-        let query = task.query(request.seed);
+        let query = asked(py, task.query(request.seed), request.hold)?;
         let started = Instant::now();
         let seconds = |value: Option<f64>| value.map(Duration::from_secs_f64);
         let (deadline, improve_for) =
@@ -64,7 +65,7 @@ pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option
             Err(failure) => return Ok((None, failed(&failure))),
         };
         let (plan, report) =
-            py.detach(|| judged_as_written(&plan, scene, level)).map_err(|error| error::input(py, &error))?;
+            py.detach(|| judged_as_written(&plan, scene, level, request.hold)).map_err(|error| error::input(py, &error))?;
         if report.accepted() {
             return Ok((Some(Plan { plan }), self::report(&report)));
         }
@@ -120,17 +121,36 @@ pub fn plan_motion(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<
 
 /// Judges `plan` in `scene` as it was read, against the query of the plan's seed, and returns the report as JSON.
 #[pyfunction]
-pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str, own_query: bool) -> PyResult<String> {
+pub fn check(
+    py: Python<'_>,
+    plan: &Plan,
+    scene: &Scene,
+    level: &str,
+    own_query: bool,
+    hold: bool,
+) -> PyResult<String> {
     guarded(py, || {
         let level = level_named(level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
+        let loaded = &scene.loaded;
+        let query = asked(py, query_of(&loaded.scene, loaded.task_for(&plan.plan.query), &plan.plan), hold)?;
         let judged = py.detach(|| {
-            let loaded = &scene.loaded;
-            let query = query_of(&loaded.scene, loaded.task_for(&plan.plan.query), &plan.plan);
             let own_query = if own_query { OwnQuery::Allowed } else { OwnQuery::Refused };
             let settings = CheckSettings { level, own_query, ..CheckSettings::default() };
             regrasp::plan::check::check((&scene.loaded.scene, &scene.loaded.state), Some(&query), &plan.plan, &settings)
         });
         Ok(report(&judged))
+    })
+}
+
+/// What is asked: `query`, or whether its object can be held at the start.
+fn asked(py: Python<'_>, query: Query, hold: bool) -> PyResult<Query> {
+    if !hold {
+        return Ok(query);
+    }
+    query.held().ok_or_else(|| {
+        let problem = "is for tasks of kind \"in_hand\" only: others start with a given grasp, or hold nothing";
+        let diagnostic = bad("A507", problem.into()).element("argument", "hold");
+        error::input(py, &diagnostic.expected("a task of kind \"in_hand\"").into())
     })
 }
 
@@ -142,16 +162,19 @@ pub fn find_scene(py: Python<'_>, plan: &Plan, path: PathBuf, current: PathBuf) 
     })
 }
 
-/// Judges the bytes that a file of `plan` would have, in a scene that is read afresh: the checker starts from files.
+/// Judges the bytes that a file of `plan` would have, in a scene that is read afresh: the checker starts from files. A plan that only
+/// `holds` is judged against the hold at the scene's start.
 fn judged_as_written(
     plan: &regrasp::Plan,
     scene: &Scene,
     level: Level,
+    holds: bool,
 ) -> Result<(regrasp::Plan, Report), regrasp::InputError> {
     let plan = format::from_json(Path::new("plan.json"), format::to_json(plan).as_bytes())
         .expect("a plan just made is a plan file");
     let again = scene.read_again()?;
     let query = again.task_for(&plan.query).query(plan.seed);
+    let query = if holds { query.held().unwrap_or(query) } else { query };
     let settings = CheckSettings { level, ..CheckSettings::default() };
     let report = regrasp::plan::check::check((&again.scene, &again.state), Some(&query), &plan, &settings);
     Ok((plan, report))
