@@ -64,8 +64,9 @@ pub fn plan(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<(Option
             Ok(plan) => plan,
             Err(failure) => return Ok((None, failed(&failure))),
         };
-        let (plan, report) =
-            py.detach(|| judged_as_written(&plan, scene, level, request.hold)).map_err(|error| error::input(py, &error))?;
+        let (plan, report) = py
+            .detach(|| judged_as_written(&plan, scene, level, request.hold))
+            .map_err(|error| error::input(py, &error))?;
         if report.accepted() {
             return Ok((Some(Plan { plan }), self::report(&report)));
         }
@@ -121,14 +122,7 @@ pub fn plan_motion(py: Python<'_>, scene: &Scene, request: Request) -> PyResult<
 
 /// Judges `plan` in `scene` as it was read, against the query of the plan's seed, and returns the report as JSON.
 #[pyfunction]
-pub fn check(
-    py: Python<'_>,
-    plan: &Plan,
-    scene: &Scene,
-    level: &str,
-    own_query: bool,
-    hold: bool,
-) -> PyResult<String> {
+pub fn check(py: Python<'_>, plan: &Plan, scene: &Scene, level: &str, own_query: bool, hold: bool) -> PyResult<String> {
     guarded(py, || {
         let level = level_named(level).map_err(|diagnostic| error::input(py, &diagnostic.into()))?;
         let loaded = &scene.loaded;

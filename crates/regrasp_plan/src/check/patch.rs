@@ -65,8 +65,8 @@ impl<'a> Patch<'a> {
                 let mut nearest: Option<(f64, Point)> = None;
                 for Facet { corners, reach } in facets {
                     let best = nearest.map_or(f64::INFINITY, |(distance, _)| distance);
-                    // No point of the triangle is nearer than this.
-                    if (corners[0] - point).norm() - reach > best {
+                    // No point of the triangle is nearer than the first corner less the reach.
+                    if (corners[0] - point).norm_squared() > (best + reach) * (best + reach) {
                         continue;
                     }
                     let foot = nearest_on_triangle(point, corners);

@@ -25,7 +25,7 @@ use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
 use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion};
 use regrasp_geometry::{Point, Pose, Vector};
 use smooth_touch::SEEN_FROM;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 
 /// Pieces after which no finer sum is made; what is then unknown counts as slip.
@@ -133,6 +133,8 @@ pub struct Roll<'a> {
     looked: Cell<u64>,
     /// Normal where a smooth hull last touched: the next is near.
     last_normal: Cell<Option<Vector>>,
+    /// Which planes of a smooth hull proved last that triangles of the patch are no nearer.
+    proofs: RefCell<Vec<usize>>,
     /// Normals that the plan says a smooth hull touches with, where the search for others begins.
     planned: [Option<Vector>; 2],
     /// Where the surface is nearer by less than this in some other place, the hull touches in both, in metres.
@@ -191,6 +193,7 @@ impl<'a> Roll<'a> {
             acceleration,
             looked: Cell::new(0),
             last_normal: Cell::new(None),
+            proofs: RefCell::default(),
             planned: [from, to].map(|waypoint| waypoint.contacts[f].normal_in_object.map(Vector::from)),
             slack: UNKNOWN_DEPTH * tolerance,
             least_gap_off_patch: 2.0 * tolerance,
@@ -226,7 +229,7 @@ impl<'a> Roll<'a> {
             let [from, to] = self.planned;
             let guesses: Vec<Vector> =
                 self.last_normal.get().into_iter().chain(from).chain(to).chain([touch.normal]).collect();
-            let place = smooth_touch::Place { patch: &self.patch, smooth, center, turn };
+            let place = smooth_touch::Place { patch: &self.patch, smooth, center, turn, proofs: &self.proofs };
             let found = place.touch(&guesses, self.slack)?;
             self.last_normal.set(Some(found.normal));
             return found.gap.is_finite().then_some(found);

@@ -59,6 +59,7 @@ use searching::attempts::{Left, run_attempts};
 use searching::first_try;
 use searching::legs::{Legs, Solution, plan_legs};
 use std::sync::atomic::AtomicUsize;
+use std::time::Instant;
 
 /// What is asked: a query and the seed of all random numbers.
 #[derive(Clone, Copy)]
@@ -101,6 +102,7 @@ pub fn plan_in_hand(
 
 /// As [`plan_in_hand`], with the query and the answer in the hand's frame.
 fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget) -> Result<Plan, Failure> {
+    let started = Instant::now();
     let mut spent = 0;
     let mut missed = Vec::new();
     let gives_start = asked.query.start_grasp != GraspRequest::Automatic;
@@ -127,7 +129,7 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
         let model = Model::new(asked.view, &effective(settings).within(&asked.view.limits).physics);
         let ends = [&asked.query.world_from_object_start, &asked.query.world_from_object_goal];
         friction::advise(&model, ends, asked.seed, failure);
-        advice::advise(asked, settings, budget, failure);
+        advice::advise(asked, settings, (budget, started.elapsed()), failure);
     }
     found
 }

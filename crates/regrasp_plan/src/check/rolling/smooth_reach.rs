@@ -16,6 +16,8 @@ use regrasp_geometry::{Point, Vector};
 const NEAR_COSINE: f64 = 0.9;
 /// A plane in so many is enough to tell what is far away.
 const COARSE: usize = 64;
+/// Stands for the plane of a triangle of which none is known yet.
+const NO_PROOF: usize = usize::MAX;
 /// Lower and upper bound of a triangle's distance agree, in metres.
 const AGREED: f64 = 1e-9;
 /// What searches on triangles leave open at most, in metres.
@@ -69,27 +71,49 @@ impl Place<'_> {
         let Patch::Triangles(facets) = self.patch else { return true };
         let facing = -self.turn.tr_mul(&touch.normal);
         let reach = self.smooth.point(&facing).dot(&facing);
-        let mut near: Option<Vec<(Vector, f64)>> = None;
+        let mut near: Option<Vec<usize>> = None;
+        let planes = self.smooth.planes();
         // What is behind the plane that touches at the touch is proven: most of the patch.
         let level = self.center.coords.dot(&touch.normal) - reach - limit;
         let height = |corner: &Point| corner.coords.dot(&touch.normal);
-        facets.iter().all(|facet| {
+        let mut known = self.proofs.borrow_mut();
+        known.resize(facets.len(), NO_PROOF);
+        let mut last = NO_PROOF;
+        facets.iter().zip(known.iter_mut()).all(|(facet, known)| {
             let is_behind = height(&facet.corners[0]) + facet.reach <= level
                 || facet.corners.iter().all(|corner| height(corner) <= level);
-            if is_behind {
+            // What proved a triangle where the hull was a moment ago, or its neighbour here, mostly does so again.
+            if is_behind || self.is_behind(*known, facet, limit) {
+                return true;
+            }
+            if self.is_behind(last, facet, limit) {
+                *known = last;
                 return true;
             }
             let corners = facet.corners.each_ref().map(|corner| self.in_link(corner));
             let near = near.get_or_insert_with(|| {
-                let planes = self.smooth.planes().iter().filter(|(m, _)| m.dot(&facing) > NEAR_COSINE);
-                planes.copied().collect()
+                (0..planes.len()).filter(|&index| planes[index].0.dot(&facing) > NEAR_COSINE).collect()
             });
-            let is_behind = |(m, reach): &(Vector, f64)| Cut::new(*m, *reach, &corners).least() >= limit;
-            near.iter().any(is_behind) || self.smooth.planes().iter().any(is_behind) || {
-                let (low, _) = self.distance(&corners, limit, false);
-                low >= limit
+            let is_behind = |index: &usize| {
+                let (m, reach) = planes[*index];
+                Cut::new(m, reach, &corners).least() >= limit
+            };
+            match near.iter().copied().find(is_behind).or_else(|| (0..planes.len()).find(is_behind)) {
+                Some(index) => {
+                    (*known, last) = (index, index);
+                    true
+                }
+                None => self.distance(&corners, limit, false).0 >= limit,
             }
         })
+    }
+
+    /// True when the plane of that index proves that `facet` comes no nearer than `limit`.
+    fn is_behind(&self, index: usize, facet: &Facet, limit: f64) -> bool {
+        let Some((m, reach)) = self.smooth.planes().get(index) else { return false };
+        let m = self.turn * m;
+        let level = self.center.coords.dot(&m) + reach + limit;
+        facet.corners.iter().all(|corner| corner.coords.dot(&m) >= level)
     }
 
     /// The nearest point of all triangles of the patch; none without triangles.
@@ -252,6 +276,7 @@ mod tests {
     use regrasp_base::Rng;
     use regrasp_geometry::{ConvexHull, Shape, TriangleMesh};
     use regrasp_robot::tip::smooth_hull::SmoothHull;
+    use std::cell::RefCell;
     use std::sync::Arc;
 
     /// A bar with flat faces, sharp rims and a rounded end.
@@ -321,7 +346,8 @@ mod tests {
             let center = Point::from(aside - turn * tip.point(&facing));
             let in_link = |point: &Point| turn.tr_mul(&(point - center));
             let patch = Patch::near(&sorted, &center, 0.03).only(|facet| may_be_near(&tip, in_link, facet, 2e-3));
-            let place = Place { patch: &patch, smooth: &tip, center, turn };
+            let proofs = RefCell::default();
+            let place = Place { patch: &patch, smooth: &tip, center, turn, proofs: &proofs };
 
             let sampled = nearest_of_samples(&triangles, &planes, in_link);
             let nearest = place.nearest().unwrap();

@@ -12,6 +12,7 @@ use crate::check::rolling::Touch;
 use crate::check::tip_surface::Smooth;
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use regrasp_geometry::{Point, Vector};
+use std::cell::RefCell;
 
 /// How far inside the tip the surface is seen from, in metres: more than the contact tolerance.
 pub const SEEN_FROM: f64 = 1.5e-3;
@@ -41,6 +42,8 @@ pub struct Place<'a> {
     pub center: Point,
     /// Its rotation.
     pub turn: Matrix3<f64>,
+    /// Per triangle of the patch, the plane of the hull that last proved it to be no nearer; may be empty.
+    pub proofs: &'a RefCell<Vec<usize>>,
 }
 
 impl Place<'_> {

@@ -31,9 +31,9 @@ pub struct ClosureTable<'a> {
 /// Which sets of fingers may be closed where no smaller one of them is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sets {
-    /// Triples of points. Four points of which no three are closed hold, but let nobody go: with four fingers they are of
-    /// no use.
-    Triples,
+    /// Triples of points and pairs of soft fingertips. Four points of which no three are closed hold, but let nobody go: with four
+    /// fingers they are of no use.
+    Few,
     /// Any.
     All,
 }
@@ -56,7 +56,7 @@ impl<'a> ClosureTable<'a> {
             options,
             n_options,
             enough,
-            sets: if are_points && n <= 4 { Sets::Triples } else { Sets::All },
+            sets: if are_points && n <= 4 { Sets::Few } else { Sets::All },
             triples: vec![f64::NAN; n_triples * n_options.pow(3)],
             pairs: vec![f64::NAN; if has_soft { (n * n_options).pow(2) } else { 0 }],
             larger: BTreeMap::new(),
@@ -122,35 +122,20 @@ impl<'a> ClosureTable<'a> {
     /// Margin of the fingers whose bit is set in `among` and whose options are contacts: the first found that is enough,
     /// or the largest.
     pub fn margin(&mut self, choice: &Choice, among: u32) -> f64 {
+        self.margin_in(self.sets, choice, among)
+    }
+
+    /// The same, where only such sets are looked at.
+    fn margin_in(&mut self, sets: Sets, choice: &Choice, among: u32) -> f64 {
         let holding = among & self.holding(choice);
         let enough = self.enough;
         let fingers: ArrayVec<usize, MAX_FINGERS> =
             (0..self.options.len()).filter(|&f| holding & (1 << f) != 0).collect();
-        let n = fingers.len();
-        let mut best = 0.0f64;
-        for i in 0..n {
-            for j in i + 1..n {
-                for k in j + 1..n {
-                    best = best.max(self.triple([fingers[i], fingers[j], fingers[k]], choice));
-                    if best >= enough {
-                        return best;
-                    }
-                }
-            }
-        }
-        if self.sets == Sets::Triples {
+        let best = self.margin_of_few(choice, &fingers);
+        if sets == Sets::Few || best >= enough {
             return best;
         }
-        if !self.pairs.is_empty() {
-            for i in 0..n {
-                for j in i + 1..n {
-                    best = best.max(self.pair([fingers[i], fingers[j]], choice));
-                    if best >= enough {
-                        return best;
-                    }
-                }
-            }
-        }
+        let n = fingers.len();
         let is_point = |&f: &usize| self.model.fingers[f].contact == ContactModel::Point;
         if n < 3 || (n == 3 && fingers.iter().all(is_point)) {
             return best;
@@ -166,6 +151,52 @@ impl<'a> ClosureTable<'a> {
             }
         };
         best.max(together)
+    }
+
+    /// Margin of triples of points and pairs of soft fingertips among `fingers`: the first found that is enough, or the largest.
+    fn margin_of_few(&mut self, choice: &Choice, fingers: &[usize]) -> f64 {
+        let (n, enough) = (fingers.len(), self.enough);
+        let mut best = 0.0f64;
+        for i in 0..n {
+            for j in i + 1..n {
+                for k in j + 1..n {
+                    best = best.max(self.triple([fingers[i], fingers[j], fingers[k]], choice));
+                    if best >= enough {
+                        return best;
+                    }
+                }
+            }
+        }
+        if !self.pairs.is_empty() {
+            for i in 0..n {
+                for j in i + 1..n {
+                    best = best.max(self.pair([fingers[i], fingers[j]], choice));
+                    if best >= enough {
+                        return best;
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// What `look` says where only triples of points and pairs of soft fingertips count as closed: much is then known after few looks, however
+    /// many fingers and options there are.
+    pub fn of_few<T>(&mut self, look: impl FnOnce(&mut Self) -> T) -> T {
+        let sets = std::mem::replace(&mut self.sets, Sets::Few);
+        let seen = look(self);
+        self.sets = sets;
+        seen
+    }
+
+    /// True where sets larger than triples and pairs count.
+    pub fn sees_larger(&self) -> bool {
+        self.sets == Sets::All
+    }
+
+    /// Number of larger sets whose margin was computed.
+    pub fn n_larger(&self) -> usize {
+        self.larger.len()
     }
 
     /// True when those of the fingers of `among` whose options are contacts keep the required margin.

@@ -70,7 +70,6 @@ pub fn rank(
     let least_follow = least_follow.unwrap_or(0.0);
     let mut clashes = ClashTable::new(options);
     let n = options.len();
-    let all = (1u32 << n) - 1;
     let most_free = most_free(model, &search.settings.search);
     let n_choices: usize = options.iter().map(Vec::len).product();
     let mut rough: Vec<Ranked> = Vec::with_capacity(n_choices);
@@ -97,10 +96,35 @@ pub fn rank(
         rough.push(Ranked { choice, worth: follow - RELOCATION_FEE * n_moved as f64 });
     }
     rough.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+    // Five fingers with ten options have 100,000 combinations, and their larger sets are dear: grasps of which few fingers hold are looked
+    // for first, and where somebody is to be moved all are compared.
+    if !keeps_first && table.sees_larger() {
+        let ranked = table.of_few(|table| closed_of(search, options, table, &mut clashes, &rough, n_wanted));
+        if ranked.len() >= n_wanted {
+            return ranked;
+        }
+    }
+    closed_of(search, options, table, &mut clashes, &rough, n_wanted)
+}
+
+/// The best of `rough`, which are sorted by their worth without the bonus, that are closed and clear.
+fn closed_of(
+    search: &mut Search,
+    options: &[Vec<Candidate>],
+    table: &mut ClosureTable,
+    clashes: &mut ClashTable,
+    rough: &[Ranked],
+    n_wanted: usize,
+) -> Vec<Ranked> {
+    let model = search.model();
+    let n = options.len();
+    let all = (1u32 << n) - 1;
+    let n_before = table.n_larger();
     let mut ranked: Vec<Ranked> = Vec::new();
-    for mut candidate in rough {
+    for candidate in rough {
         // The bonus is at most RELEASE_BONUS: nothing later can overtake what is already there.
-        if ranked.len() >= n_wanted && candidate.worth + RELEASE_BONUS < ranked[n_wanted - 1].worth {
+        let is_late = ranked.len() >= n_wanted && candidate.worth + RELEASE_BONUS < ranked[n_wanted - 1].worth;
+        if is_late || table.n_larger() > n_before + MOST_LARGER {
             break;
         }
         if !table.is_closed(&candidate.choice, all) {
@@ -115,6 +139,7 @@ pub fn rank(
         if !clashes.is_clear(&mut search.workspace, options, &candidate.choice) {
             continue;
         }
+        let mut candidate = candidate.clone();
         candidate.worth += RELEASE_BONUS * n_releasable.saturating_sub(1) as f64 / (n - 1) as f64;
         let place = ranked.partition_point(|other| other.worth >= candidate.worth);
         ranked.insert(place, candidate);
@@ -122,6 +147,9 @@ pub fn rank(
     }
     ranked
 }
+
+/// Larger sets of fingers looked at for one ranking, of the most worthy combinations. Four fingers with few candidates have no more.
+const MOST_LARGER: usize = 2_000;
 
 /// Share of the way that a relocation must gain to be worth it. By hand.
 const RELOCATION_FEE: f64 = 0.08;

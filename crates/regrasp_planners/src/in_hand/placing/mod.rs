@@ -19,7 +19,7 @@ pub mod samples;
 pub mod sizes;
 
 use crate::in_hand::attempt::search::{Context, Search};
-use crate::in_hand::attempt::tally::Reason;
+use crate::in_hand::attempt::tally::{Reason, Tally};
 use crate::in_hand::effective;
 use crate::settings::InHandSettings;
 pub use hint::with_hint;
@@ -148,39 +148,53 @@ pub fn place(
 
     let winner = AtomicUsize::new(usize::MAX);
     let context = Context { model, settings, seed, budget, winner: &winner, progress };
-    let mut search = Search::new(context, [Pose::identity(); 2], 0, u64::MAX);
-    search.rng = Rng::keyed(seed, "place_evidence", 0);
-    search.holds_only = !moves;
+    let look = |(index, (_, start)): &(usize, (f64, Pose))| {
+        let mut search = Search::new(context, [Pose::identity(); 2], 0, u64::MAX);
+        search.rng = Rng::keyed(seed, "place_evidence", *index as u64);
+        search.holds_only = !moves;
+        let first = Evidence::gather(&mut search, start);
+        let mut worths = vec![first.worth(model)];
+        if first.grasp.is_some() {
+            let others = asked.others(start);
+            worths.extend(others.iter().map(|pose| Evidence::gather(&mut search, pose).worth(model)));
+        }
+        (first.grasp, worths, search.workspace.work, search.whole_tally())
+    };
     let mut places: Vec<Place> = Vec::new();
-    let mut cut = None;
-    for (worth, start) in &best {
-        if let Err(interrupt) = budget.check(search.workspace.work) {
-            cut = Some(interrupt);
+    let (mut cut, mut looked_work, mut tally) = (None, 0, Tally::default());
+    let numbered: Vec<(usize, (f64, Pose))> = best.iter().copied().enumerate().collect();
+    // Several poses at the same time. What one thread would not have come to, because the work is spent, does not count.
+    'looks: for together in numbered.chunks(settings.n_threads.max(1)) {
+        cut = budget.check(looked_work).err();
+        if cut.is_some() {
             break;
         }
-        tried.looked_at += 1;
-        let first = Evidence::gather(&mut search, start);
-        let Some(grasp) = first.grasp.clone() else { continue };
-        tried.with_grasp += 1;
-        let mut worths = vec![first.worth(model)];
-        for pose in asked.others(start) {
-            worths.push(Evidence::gather(&mut search, &pose).worth(model));
+        for ((_, (worth, start)), (grasp, worths, work, seen)) in together.iter().zip(at_once(together, look)) {
+            cut = budget.check(looked_work).err();
+            if cut.is_some() {
+                break 'looks;
+            }
+            tried.looked_at += 1;
+            looked_work += work;
+            tally.merge(&seen);
+            let Some(grasp) = grasp else { continue };
+            tried.with_grasp += 1;
+            let evidence = (worths.iter().map(|worth| worth.ln()).sum::<f64>() / worths.len() as f64).exp();
+            places.push(Place {
+                world_from_object: view.world_from(start),
+                outlook: *worth,
+                evidence,
+                probes: Vec::new(),
+                joints: grasp.joints.iter().flatten().copied().collect(),
+            });
         }
-        let evidence = (worths.iter().map(|worth| worth.ln()).sum::<f64>() / worths.len() as f64).exp();
-        places.push(Place {
-            world_from_object: view.world_from(start),
-            outlook: *worth,
-            evidence,
-            probes: Vec::new(),
-            joints: grasp.joints.iter().flatten().copied().collect(),
-        });
     }
-    tried.work += search.workspace.work;
+    tried.work += looked_work;
     if cut == Some(Interrupt::Cancelled) {
         return Err(Failure::bare(FailureKind::Interrupted, "interrupted".into(), ""));
     }
     if places.is_empty() {
-        return Err(not_found(model, &best, &search, &tried, cut));
+        return Err(not_found(model, &best, (&tally, !moves), &tried, cut));
     }
     // Stable: of equals the one that was estimated better stays first.
     places.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
@@ -213,7 +227,8 @@ fn search_from(
         // Another seed than that of the plan: what is asked is how often a plan is found.
         let seed = seed.wrapping_add(1 + round);
         let work = if round == 0 { PROBE_WORK.0 } else { PROBE_WORK.1 };
-        let probe_all = |place: &Place| probe(view, queries, &place.world_from_object, (settings, seed, budget), work);
+        let probe_all =
+            |place: &&mut Place| probe(view, queries, &place.world_from_object, (settings, seed, budget), work);
         let mut n_searched = 0;
         for together in places.chunks_mut(settings.n_threads.max(1)) {
             if budget.check(tried.work).is_err() {
@@ -257,11 +272,11 @@ fn search_from(
     Ok(())
 }
 
-/// What `look` says of every place, in their order; each is looked at by a thread of its own.
-fn at_once<T: Send>(places: &[&mut Place], look: impl Fn(&Place) -> T + Sync) -> Vec<T> {
-    let [first, others @ ..] = places else { return Vec::new() };
+/// What `look` says of every item, in their order; each is looked at by a thread of its own.
+fn at_once<I: Sync, T: Send>(items: &[I], look: impl Fn(&I) -> T + Sync) -> Vec<T> {
+    let [first, others @ ..] = items else { return Vec::new() };
     std::thread::scope(|scope| {
-        let others: Vec<_> = others.iter().map(|place| scope.spawn(|| look(place))).collect();
+        let others: Vec<_> = others.iter().map(|item| scope.spawn(|| look(item))).collect();
         let mut seen = vec![look(first)];
         for other in others {
             seen.push(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
@@ -403,9 +418,14 @@ fn best_apart(
 }
 
 /// Why no place was found: the causes, and the pose that looked best.
-fn not_found(model: &Model, best: &[(f64, Pose)], search: &Search, tried: &Tried, cut: Option<Interrupt>) -> Failure {
-    let tally = search.whole_tally();
-    let wanted = if search.holds_only { "" } else { " and a finger may lift" };
+fn not_found(
+    model: &Model,
+    best: &[(f64, Pose)],
+    (tally, holds_only): (&Tally, bool),
+    tried: &Tried,
+    cut: Option<Interrupt>,
+) -> Failure {
+    let wanted = if holds_only { "" } else { " and a finger may lift" };
     let mut causes = tally.causes(model);
     if tried.blocked > 0 {
         let reason = "the object is in collision with palm or obstacles at the start or on its way".to_owned();
