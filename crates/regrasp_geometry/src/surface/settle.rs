@@ -11,6 +11,9 @@ use crate::frame::UnitVector;
 const TOLERANCE: f64 = 1e-9;
 /// Pushes before giving up; wide grooves take 2 to 20.
 const MAX_PUSHES: usize = 100;
+/// Cosine of the angle between a push and the next from which on the ball is between two walls that are nearer to each other than it is
+/// wide: it would be pushed to and fro for ever. In grooves that open less than 20 degrees 100 pushes are too few.
+const TO_AND_FRO: f64 = -0.94;
 
 /// Adds the distances measured to `n_measured`.
 pub(super) fn settle(
@@ -23,6 +26,7 @@ pub(super) fn settle(
         return Some(*near);
     }
     let mut center = near.point_in_object + near.normal_in_object.as_ref() * tip_radius;
+    let mut last_push = near.normal_in_object.into_inner();
     for push in 0..MAX_PUSHES {
         *n_measured += 1;
         // The ball touches the point that it comes from.
@@ -40,6 +44,10 @@ pub(super) fn settle(
             let normal = UnitVector::new_unchecked(away / distance);
             return (slid <= 2.0 * tip_radius && is_outside).then(|| SurfacePoint::new(settled, normal, nearest.facet));
         }
+        if away.dot(&last_push) < TO_AND_FRO * distance {
+            return None;
+        }
+        last_push = away / distance;
         center = nearest.point_in_object + away * (tip_radius / distance);
     }
     None
