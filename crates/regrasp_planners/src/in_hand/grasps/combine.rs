@@ -96,11 +96,11 @@ pub fn rank(
         rough.push(Ranked { choice, worth: follow - RELOCATION_FEE * n_moved as f64 });
     }
     rough.sort_by(|a, b| b.worth.total_cmp(&a.worth));
-    // Five fingers with ten options have 100,000 combinations, and their larger sets are dear: grasps of which few fingers hold are looked
-    // for first, and where somebody is to be moved all are compared.
-    if !keeps_first && table.sees_larger() {
+    // Five fingers with ten options have 100,000 combinations, and their larger sets are dear: they are looked at where sets of few fingers
+    // close nothing.
+    if table.sees_larger() {
         let ranked = table.of_few(|table| closed_of(search, options, table, &mut clashes, &rough, n_wanted));
-        if ranked.len() >= n_wanted {
+        if !ranked.is_empty() {
             return ranked;
         }
     }

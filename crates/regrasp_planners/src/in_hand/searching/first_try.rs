@@ -21,6 +21,11 @@ const SHARE_FOR_BOTH: f64 = 1.0 / 3.0;
 /// How many times longer the same work takes where fingertips that are meshes roll on meshes: with all of it, tries would take up
 /// to a minute there. Measured on scans in the LEAP hand: 135 to 190 microseconds a configuration, where the Allegro's balls take 3.
 const LONGER: u64 = 16;
+/// The same for hands of more than four fingers, whose sets of fingers are many. Measured on the Shadow hand: a configuration takes three
+/// times as long as in the Allegro; first tries took five seconds of the six to ten that turns of a cube took, and found none.
+const LONGER_WITH_MANY: u64 = 4;
+/// Fingers up to which they are not many.
+const FEW_FINGERS: usize = 4;
 
 /// Settings and work of what is tried first, in order; none where there is nothing to try: more clearance and more closure, and
 /// more clearance alone.
@@ -37,7 +42,7 @@ pub fn first_tries(
         true => wanted.work.min(settings.search.courses_work.saturating_mul(2)),
         false => wanted.work,
     };
-    let most_work = if takes_long(view) { most_work / LONGER } else { most_work };
+    let most_work = most_work / times_longer(view);
     let can_keep = |finger: &Finger| stand_back(finger).is_none_or(|back| back >= 2.0 * wanted.clearance);
     let keeps_away = wanted.clearance > settings.physics.clearance && view.hand.fingers.iter().all(can_keep);
     let closes_more = wanted.closure_margin > settings.physics.closure_margin;
@@ -70,10 +75,15 @@ pub fn tell(failure: &mut Failure, missed: Vec<Failure>) {
     failure.nearest_miss = Some(nearest);
 }
 
-/// True where fingertips that are meshes roll on a mesh.
-fn takes_long(view: &HandView) -> bool {
+/// How many times longer than in a hand of four fingers with balls a configuration takes, about.
+fn times_longer(view: &HandView) -> u64 {
     let is_smooth = |finger: &Finger| matches!(finger.tip.curved(), Some(CurvedTip::Smooth(_)));
-    view.object.surface.mesh().is_some() && view.hand.fingers.iter().any(is_smooth)
+    let meshes_roll = view.object.surface.mesh().is_some() && view.hand.fingers.iter().any(is_smooth);
+    match (meshes_roll, view.hand.fingers.len() > FEW_FINGERS) {
+        (true, _) => LONGER,
+        (false, true) => LONGER_WITH_MANY,
+        (false, false) => 1,
+    }
 }
 
 /// How far the link behind a round tip stands back behind it where it is thinnest, in metres: no finger keeps its last link
@@ -173,6 +183,19 @@ mod tests {
         let mesh = "mesh = { file = \"../assets/objects/icosahedron.obj\" }";
         assert_eq!(tries(mesh, false), tries(sphere, false));
         assert_eq!(tries(mesh, true), tries(sphere, true).iter().map(|work| work / 16).collect::<Vec<u64>>());
+    }
+
+    #[test]
+    fn hands_of_more_than_four_fingers_have_a_quarter() {
+        let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        let tries = |scene: &str| -> Vec<u64> {
+            let loaded = regrasp_scene::load_scene(&scenes.join(scene), &LoadOptions::default()).unwrap();
+            let tries = first_tries(&loaded.view(), &InHandSettings::default(), &Budget::work(10_000_000), false);
+            tries.into_iter().map(|(_, work)| work).collect()
+        };
+        let of_four = tries("box_90x.toml");
+        assert!(!of_four.is_empty());
+        assert_eq!(tries("six_finger_box_90x.toml"), of_four.iter().map(|work| work / 4).collect::<Vec<u64>>());
     }
 
     #[test]
