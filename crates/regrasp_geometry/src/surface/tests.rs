@@ -410,6 +410,36 @@ fn a_ball_in_a_groove_touches_both_walls_and_one_in_a_slit_is_refused() {
     assert_eq!(surface.settle(&floor, 0.012), None);
 }
 
+/// In a round hole, of 24 walls, a ball that is too wide is pushed from one wall straight to the wall opposite.
+#[test]
+fn a_ball_that_is_wider_than_a_hole_is_refused_after_few_looks() {
+    let wall = |k: usize, radius: f64, z: f64| {
+        let (sine, cosine) = (std::f64::consts::TAU * k as f64 / 24.0).sin_cos();
+        Point::new(radius * cosine, radius * sine, z)
+    };
+    let mut triangles = Vec::new();
+    for k in 0..24 {
+        for (from, to) in [
+            ((0.02, 0.0), (0.02, 0.08)),
+            ((0.02, 0.08), (0.03, 0.08)),
+            ((0.03, 0.08), (0.03, 0.0)),
+            ((0.03, 0.0), (0.02, 0.0)),
+        ] {
+            let [a, b] = [k, k + 1].map(|k| wall(k, from.0, from.1));
+            let [c, d] = [k + 1, k].map(|k| wall(k, to.0, to.1));
+            triangles.extend([[a, c, b], [a, d, c]]);
+        }
+    }
+    let surface = Surface::of(&soup(triangles)).unwrap();
+    let inside = surface.cast_ray(&Point::new(0.001, 0.0005, 0.041), &Vector::x_axis()).unwrap();
+    assert!(inside.normal_in_object.x < -0.9, "{:?}", inside.normal_in_object);
+    let mut n_measured = 0;
+    assert!(surface.settle_counted(&inside, 0.015, &mut n_measured).is_some() && n_measured < 10, "{n_measured}");
+    let mut n_measured = 0;
+    assert_eq!(surface.settle_counted(&inside, 0.025, &mut n_measured), None);
+    assert!(n_measured < 10, "{n_measured}");
+}
+
 #[test]
 fn what_lies_inside_other_parts_is_never_sampled() {
     let half = Vector::repeat(0.03);

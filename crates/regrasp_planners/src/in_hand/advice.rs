@@ -135,3 +135,27 @@ fn shifted(query: &InHandQuery, by: &Vector) -> InHandQuery {
         ..query.clone()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regrasp_robot::LoadOptions;
+
+    /// What is tried after a search that ended by its time limit takes a share of the time that it took, and no more.
+    #[test]
+    fn trials_after_a_time_limit_have_a_share_of_the_time() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
+        let loaded = regrasp_scene::load_scene(&path, &LoadOptions::default()).unwrap();
+        let (view, query) = (loaded.view(), loaded.task().query(0).as_in_hand().unwrap().clone());
+        let asked = Asked { view: &view, query: &query, seed: 0, progress: &|_| {} };
+        let advice = |searched: Duration| {
+            let mut failure = Failure::bare(FailureKind::TimeLimit, "no plan".into(), "allow more time");
+            failure.statistics.work = 1_000_000;
+            let budget = Budget::work(1_000_000).with_deadline(Instant::now());
+            advise(&asked, &InHandSettings::default(), (&budget, searched), &mut failure);
+            failure.advice
+        };
+        assert_eq!(advice(Duration::ZERO), "allow more time");
+        assert!(advice(Duration::from_secs(10_000)).starts_with(START_AT));
+    }
+}

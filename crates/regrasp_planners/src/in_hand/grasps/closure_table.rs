@@ -245,6 +245,7 @@ mod tests {
                 let options: Vec<Vec<Candidate>> = (0..n_fingers).map(of_finger).collect();
                 let mut table = ClosureTable::new(model, &options);
                 let mut seen = [[0; 2]; MAX_FINGERS + 1];
+                let mut n_only_larger = 0;
                 for _ in 0..4000 {
                     let choice: Choice = (0..n_fingers).map(|_| search.rng.below(states.len())).collect();
                     let among = search.rng.below(1 << n_fingers) as u32;
@@ -257,10 +258,16 @@ mod tests {
                         assert!(is_closed || !table.is_closed(&choice, among), "{choice:?}: {margin}");
                         continue;
                     }
+                    // What few fingers close is closed, and of three there is nothing else.
+                    let few_close = table.of_few(|table| table.is_closed(&choice, among));
+                    assert!(is_closed || !few_close, "{scene} {choice:?} {among:b}: {margin}");
+                    assert!(n_holding > 3 || few_close == is_closed, "{scene} {choice:?} {among:b}: {margin}");
+                    n_only_larger += usize::from(is_closed && !few_close);
                     assert_eq!(table.is_closed(&choice, among), is_closed, "{scene} {choice:?} {among:b}: {margin}");
                     seen[n_holding][usize::from(is_closed)] += 1;
                 }
                 assert!((3..n_fingers).all(|n| seen[n].iter().all(|&count| count >= 5)), "{seen:?}");
+                assert!(n_fingers == 4 || n_only_larger >= 5, "{n_only_larger}");
             });
         }
     }
