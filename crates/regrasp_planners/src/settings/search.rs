@@ -53,7 +53,8 @@ pub struct FirstTry {
     /// Force-closure margin of every set of holding fingers, if it is larger than the usual one.
     pub closure_margin: f64,
     /// Work after which the planner goes on with the usual values; a sixteenth of it where fingertips that are meshes roll on a
-    /// mesh, and a quarter in hands of more than four fingers, which take so much longer. By hand: enough for most turns of an Allegro hand, about half a second.
+    /// mesh, and a quarter in hands of more than four fingers, which take so much longer. By hand: enough for most turns of an
+    /// Allegro hand, about half a second.
     pub work: u64,
 }
 

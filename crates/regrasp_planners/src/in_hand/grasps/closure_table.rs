@@ -122,17 +122,12 @@ impl<'a> ClosureTable<'a> {
     /// Margin of the fingers whose bit is set in `among` and whose options are contacts: the first found that is enough,
     /// or the largest.
     pub fn margin(&mut self, choice: &Choice, among: u32) -> f64 {
-        self.margin_in(self.sets, choice, among)
-    }
-
-    /// The same, where only such sets are looked at.
-    fn margin_in(&mut self, sets: Sets, choice: &Choice, among: u32) -> f64 {
         let holding = among & self.holding(choice);
         let enough = self.enough;
         let fingers: ArrayVec<usize, MAX_FINGERS> =
             (0..self.options.len()).filter(|&f| holding & (1 << f) != 0).collect();
         let best = self.margin_of_few(choice, &fingers);
-        if sets == Sets::Few || best >= enough {
+        if self.sets == Sets::Few || best >= enough {
             return best;
         }
         let n = fingers.len();
@@ -180,8 +175,8 @@ impl<'a> ClosureTable<'a> {
         best
     }
 
-    /// What `look` says where only triples of points and pairs of soft fingertips count as closed: much is then known after few looks, however
-    /// many fingers and options there are.
+    /// What `look` says where only triples of points and pairs of soft fingertips count as closed. Their number does not grow with that
+    /// of all combinations.
     pub fn of_few<T>(&mut self, look: impl FnOnce(&mut Self) -> T) -> T {
         let sets = std::mem::replace(&mut self.sets, Sets::Few);
         let seen = look(self);

@@ -54,7 +54,7 @@ impl ClashTable {
 }
 
 /// The best closed combinations of `options` that fit together, with no more free fingers than the settings allow, best
-/// first. With `least_follow`, option 0 of a finger is
+/// first: of those that triples of points or pairs of soft fingertips close; of all, where there are none of these. With `least_follow`, option 0 of a finger is
 /// where it is, others cost a relocation, and all must follow at least that share of the way. `freedom` says which share of
 /// the way a combination leaves to the object.
 pub fn rank(
@@ -96,8 +96,8 @@ pub fn rank(
         rough.push(Ranked { choice, worth: follow - RELOCATION_FEE * n_moved as f64 });
     }
     rough.sort_by(|a, b| b.worth.total_cmp(&a.worth));
-    // Five fingers with ten options have 100,000 combinations, and their larger sets are dear: they are looked at where sets of few fingers
-    // close nothing.
+    // Five fingers with ten options have 100,000 combinations: by measurement on the Shadow hand, margins of larger sets took 60 % of the time
+    // of a search for places.
     if table.sees_larger() {
         let ranked = table.of_few(|table| closed_of(search, options, table, &mut clashes, &rough, n_wanted));
         if !ranked.is_empty() {
@@ -148,7 +148,7 @@ fn closed_of(
     ranked
 }
 
-/// Larger sets of fingers looked at for one ranking, of the most worthy combinations. Four fingers with few candidates have no more.
+/// Larger sets of fingers looked at for one ranking, those of the most worthy combinations first. By hand.
 const MOST_LARGER: usize = 2_000;
 
 /// Share of the way that a relocation must gain to be worth it. By hand.

@@ -21,8 +21,8 @@ const SHARE_FOR_BOTH: f64 = 1.0 / 3.0;
 /// How many times longer the same work takes where fingertips that are meshes roll on meshes: with all of it, tries would take up
 /// to a minute there. Measured on scans in the LEAP hand: 135 to 190 microseconds a configuration, where the Allegro's balls take 3.
 const LONGER: u64 = 16;
-/// The same for hands of more than four fingers, whose sets of fingers are many. Measured on the Shadow hand: a configuration takes three
-/// times as long as in the Allegro; first tries took five seconds of the six to ten that turns of a cube took, and found none.
+/// The same for hands of more than four fingers, whose sets of fingers are many. Measured on the Shadow hand: a configuration takes 22
+/// microseconds where it takes 7 in the Allegro.
 const LONGER_WITH_MANY: u64 = 4;
 /// Fingers up to which they are not many.
 const FEW_FINGERS: usize = 4;
