@@ -54,9 +54,10 @@ impl ClashTable {
 }
 
 /// The best closed combinations of `options` that fit together, with no more free fingers than the settings allow, best
-/// first: of those that triples of points or pairs of soft fingertips close; of all, where there are none of these. With `least_follow`, option 0 of a finger is
-/// where it is, others cost a relocation, and all must follow at least that share of the way. `freedom` says which share of
-/// the way a combination leaves to the object.
+/// first: of those that triples of points or pairs of soft fingertips close; of all, where there are none of these.
+///
+/// With `least_follow`, option 0 of a finger is where it is, others cost a relocation, and all must follow at least that share
+/// of the way. `freedom` says which share of the way a combination leaves to the object.
 pub fn rank(
     search: &mut Search,
     options: &[Vec<Candidate>],
