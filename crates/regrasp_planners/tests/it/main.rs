@@ -1,5 +1,6 @@
 //! Tests of the planners through their public functions, on the bundled scenes.
 
+mod above_base;
 mod advice;
 mod carried;
 mod closing_fingers;

@@ -1,7 +1,8 @@
 //! A [`Hand`] from a robot and the choice of its fingers.
 //!
 //! Fixed joints are folded into bodies. A finger is the serial chain from the base to its tip link. What no finger
-//! joint moves is palm; moving joints that belong to no finger are held at the position nearest to zero.
+//! joint moves is palm, links above the base too where no arm carries the hand; moving joints that belong to no finger
+//! are held at the position nearest to zero.
 
 use super::chain::{ChainOwner, make_chain, middle_of_limits, rest_posture};
 use super::fixes;
@@ -46,17 +47,27 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
     for (index, (finger, joints)) in spec.fingers.iter().zip(&moving).enumerate() {
         fingers.extend(make_finger(robot, index, finger, joints, &carried, (&mut hulls, &mut hull_tips), &mut found));
     }
+    // An arm that carries the hand moves, and is no part of it.
+    let above = match spec.mount {
+        Some(_) => BTreeMap::new(),
+        None => above_base(robot, &carried, &owner, file, &mut found),
+    };
+    let of_palm =
+        carried.iter().filter(|(_, at)| at.body == RigidBody::Palm).map(|(&link, at)| (link, at.body_from_link));
     let mut palm = Vec::new();
-    for (&link, at) in carried.iter().filter(|(_, at)| at.body == RigidBody::Palm) {
-        let shapes = hulls.of_link(link, &at.body_from_link, &mut found);
+    for (link, base_from_link) in of_palm.chain(above.iter().map(|(&link, &pose)| (link, pose))) {
+        let shapes = hulls.of_link(link, &base_from_link, &mut found);
         palm.extend(shapes.into_iter().map(|placed| PalmShape { link, placed }));
     }
     let mut allowed_pairs = spec.allow.clone();
     allowed_pairs.extend(adjacent_pairs(robot, &carried, &moving));
-    let outside = robot.links.len() - carried.len();
-    if outside > 0 && spec.mount.is_none() {
+    if !above.is_empty() {
         let base = &robot.links[spec.base.0].name;
-        notes.push(format!("{outside} links are not carried by base link \"{base}\" and are not part of the hand"));
+        let names: Vec<String> = above.keys().map(|link| format!("\"{}\"", robot.links[link.0].name)).collect();
+        notes.push(format!(
+            "what is above base link \"{base}\" stands still with it, its joints as near to zero as their limits let them: {}",
+            some_of(&names)
+        ));
     }
     for finger in &spec.fingers {
         let link = &robot.links[finger.tip_link.0];
@@ -94,16 +105,21 @@ fn drawn_only_note(robot: &Robot, spec: &HandSpec, links: impl Iterator<Item = L
     };
     let drawn: Vec<String> =
         links.filter(is_drawn_only).map(|link| format!("\"{}\"", robot.links[link.0].name)).collect();
-    let more = match drawn.len().saturating_sub(MOST_NAMED) {
+    (!drawn.is_empty()).then(|| {
+        format!(
+            "links that are drawn but have no collision geometry, so that plans do not keep clear of them: {}",
+            some_of(&drawn)
+        )
+    })
+}
+
+/// The first of `names`, and how many more there are.
+fn some_of(names: &[String]) -> String {
+    let more = match names.len().saturating_sub(MOST_NAMED) {
         0 => String::new(),
         n => format!(" and {n} more"),
     };
-    let named = drawn[..drawn.len().min(MOST_NAMED)].join(", ");
-    (!drawn.is_empty()).then(|| {
-        format!(
-            "links that are drawn but have no collision geometry, so that plans do not keep clear of them: {named}{more}"
-        )
-    })
+    names[..names.len().min(MOST_NAMED)].join(", ") + &more
 }
 
 /// The moving joints of each finger, base first.
@@ -205,6 +221,40 @@ fn carry(
         }
     }
     carried
+}
+
+/// Poses in the base frame of the links that no link in `carried` carries: those above the base, and their other branches.
+fn above_base(
+    robot: &Robot,
+    carried: &BTreeMap<LinkId, Carried>,
+    owner: &BTreeMap<JointId, (usize, usize)>,
+    file: &Path,
+    found: &mut Diagnostics,
+) -> BTreeMap<LinkId, Pose> {
+    // One remark for all of them is enough.
+    let mut notes = Vec::new();
+    let mut above: BTreeMap<LinkId, Pose> = BTreeMap::new();
+    let mut waiting: VecDeque<(LinkId, Pose)> = carried
+        .iter()
+        .filter(|(_, at)| at.body == RigidBody::Palm)
+        .map(|(&link, at)| (link, at.body_from_link))
+        .collect();
+    while let Some((link, base_from_link)) = waiting.pop_front() {
+        let up = robot.links[link.0].parent_joint.map(|id| (id, robot.joints[id.0].parent));
+        let down = robot.joints_from(link).map(|id| (id, robot.joints[id.0].child));
+        for (id, next) in up.into_iter().chain(down) {
+            if carried.contains_key(&next) || above.contains_key(&next) {
+                continue;
+            }
+            let parent_from_child =
+                robot.joints[id.0].parent_from_joint * held_at(robot, id, owner, file, found, &mut notes);
+            let is_up = Some(id) == robot.links[link.0].parent_joint;
+            let link_from_next = if is_up { parent_from_child.inverse() } else { parent_from_child };
+            above.insert(next, base_from_link * link_from_next);
+            waiting.push_back((next, base_from_link * link_from_next));
+        }
+    }
+    above
 }
 
 /// The motion of a joint that belongs to no finger, at the position where it is held.
