@@ -288,14 +288,15 @@ impl<'a> RollStep<'a> {
     /// Where the tip may be nearly flat the parts are halved until the sum settles: contacts sweep over such faces.
     fn slip_over_parts(&self, end: &Rolled, between: &impl Fn(f64) -> Placement, allowed: f64) -> Option<Slipped> {
         let usual = if self.model.view.object.surface.mesh().is_some() { PARTS_ON_MESH } else { PARTS };
-        let mut sum = self.slip_over(end, between, allowed, usual)?;
+        let mut touches = Vec::new();
+        let mut sum = self.slip_over(end, between, allowed, (usual, &mut touches))?;
         if !matches!(self.model.fingers[self.finger].curved, Some(CurvedTip::Smooth(_))) {
             return Some(sum);
         }
         let mut n_parts = usual;
         while n_parts < MOST_PARTS {
             n_parts *= 2;
-            let finer = self.slip_over(end, between, allowed, n_parts)?;
+            let finer = self.slip_over(end, between, allowed, (n_parts, &mut touches))?;
             let change = finer.way - sum.way;
             sum = finer;
             if change.norm() <= SETTLED * STEP_SLIP {
@@ -305,13 +306,13 @@ impl<'a> RollStep<'a> {
         None
     }
 
-    /// The same over so many parts, an even number.
+    /// The same over so many parts, an even number. `touches` are those between half as many parts, if any, then between these.
     fn slip_over(
         &self,
         end: &Rolled,
         between: &impl Fn(f64) -> Placement,
         allowed: f64,
-        n_parts: usize,
+        (n_parts, touches): (usize, &mut Vec<Touching>),
     ) -> Option<Slipped> {
         let finger = &self.model.fingers[self.finger];
         let chain = finger.ik.chain();
@@ -322,10 +323,18 @@ impl<'a> RollStep<'a> {
             sum.way += self.slip(from, to);
             sum.spin += self.spin(from, to);
         };
+        let coarser = std::mem::take(touches);
         for k in 1..n_parts {
+            let known = if k % 2 == 0 { coarser.get(k / 2 - 1) } else { None };
             let t = k as f64 / n_parts as f64;
-            let joints: Coordinates = self.joints.iter().zip(&end.joints).map(|(a, b)| a + t * (b - a)).collect();
-            let touch = self.touch(&chain.last_frame(&joints), &between(t), &last_near)?;
+            let touch = match known {
+                Some(touch) => *touch,
+                None => {
+                    let joints: Coordinates =
+                        self.joints.iter().zip(&end.joints).map(|(a, b)| a + t * (b - a)).collect();
+                    self.touch(&chain.last_frame(&joints), &between(t), &last_near)?
+                }
+            };
             let facing = -touch.stance.object_from_link.tr_mul(&touch.stance.normal);
             if touch.gap.abs() > allowed || finger.pad.is_some_and(|pad| !pad.holds(&facing)) {
                 return None;
@@ -335,6 +344,7 @@ impl<'a> RollStep<'a> {
             }
             add(&before, &touch.stance);
             (before, last_near) = (touch.stance, touch.near());
+            touches.push(touch);
         }
         let last = RollStep::new(self.model, self.finger, &end.contact, &end.joints, self.to, self.to).start;
         add(&before, &last);

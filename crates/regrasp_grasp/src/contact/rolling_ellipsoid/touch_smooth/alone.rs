@@ -16,6 +16,8 @@ const MOST_STEPS: usize = 20;
 const MOST_HALVINGS: usize = 5;
 /// Longest step, in radians.
 const LONGEST_STEP: f64 = 0.4;
+/// A step that is shorter leads so near that nobody looks again.
+const LAST_STEP: f64 = 1e-7;
 /// How far the touching point may be off the normal, in metres.
 const OFF: f64 = 2e-16;
 
@@ -37,6 +39,9 @@ pub(super) fn normal(tip: &SmoothHull, stance: &Stance, facing: &Facing, place: 
             break;
         }
         let turn = now.turn()?;
+        if turn.norm() < LAST_STEP {
+            return Some((now.normal + turn).normalize());
+        }
         let mut share = (LONGEST_STEP / turn.norm()).min(1.0);
         let better = (0..MOST_HALVINGS).find_map(|_| {
             let next = Aside::of(tip, stance, along.as_ref(), place, (now.normal + turn * share).normalize());
