@@ -50,6 +50,9 @@ const PREFERENCE_WEIGHT: f64 = 0.2;
 /// lose twice as many.
 const PREFERENCE_DAMPING: f64 = 1.0;
 
+/// How far off the end of a coarse step may be, in metres.
+const COARSE: f64 = 1e-5;
+
 /// Corrections of a step by the slip seen over its halves.
 const CORRECTIONS: usize = 3;
 
@@ -202,8 +205,8 @@ impl<'a> RollStep<'a> {
     }
 
     /// Joints without slip at the end of the step, by the midpoint rule, less what is known of its error. Soft fingertips
-    /// with a joint to spare also turn along with the object.
-    fn solve(&self, near: &Coordinates, settings: &IkSettings, error: &Slipped) -> Option<Rolled> {
+    /// with a joint to spare also turn along with the object. The end may be off by `tolerance`, in metres, or what the inverse kinematics allow.
+    fn solve(&self, near: &Coordinates, (settings, tolerance): (&IkSettings, f64), error: &Slipped) -> Option<Rolled> {
         let finger = &self.model.fingers[self.finger];
         let turns_along = self.model.resists_spin(self.finger) && finger.ik.is_redundant();
         let mut end: Option<Touching> = None;
@@ -212,7 +215,10 @@ impl<'a> RollStep<'a> {
             let touch = self.touch(link, self.to, &end.as_ref().map_or(first, Touching::near))?;
             let normal = touch.stance.normal;
             let slipped = self.slip(&self.start, &touch.stance) + error.way;
-            let off = slipped - normal * normal.dot(&slipped) + normal * touch.gap;
+            let mut off = slipped - normal * normal.dot(&slipped) + normal * touch.gap;
+            if off.norm() < tolerance {
+                off = Vector::zeros();
+            }
             end = Some(touch);
             let arm = match finger.curved {
                 None => -self.to.vector(&(normal * finger.tip_radius)),
@@ -234,7 +240,7 @@ impl<'a> RollStep<'a> {
 
     /// The end of a long step, for looking ahead: no look at what happens half-way.
     pub fn coarse(&self, max_step: f64) -> Option<Rolled> {
-        self.solve(self.joints, &self.settings(max_step), &Slipped::default())
+        self.solve(self.joints, (&self.settings(max_step), COARSE), &Slipped::default())
     }
 
     /// The end of the step; `between` places the object at a share of it. The tip may leave the surface by `allowed` on the
@@ -244,7 +250,7 @@ impl<'a> RollStep<'a> {
         let is_soft = self.model.resists_spin(self.finger);
         let turns_along = is_soft && self.model.fingers[self.finger].ik.is_redundant();
         let mut error = Slipped::default();
-        let mut end = self.solve(self.joints, &settings, &error).ok_or(NoStep::OutOfReach)?;
+        let mut end = self.solve(self.joints, (&settings, 0.0), &error).ok_or(NoStep::OutOfReach)?;
         // Corrections change the step by little: nothing else is to change.
         settings.preference = None;
         for correction in 0..=CORRECTIONS {
@@ -258,7 +264,7 @@ impl<'a> RollStep<'a> {
             if correction < CORRECTIONS {
                 error.way += left.way;
                 error.spin += left.spin;
-                end = self.solve(&end.joints, &settings, &error).ok_or(NoStep::OutOfReach)?;
+                end = self.solve(&end.joints, (&settings, 0.0), &error).ok_or(NoStep::OutOfReach)?;
             }
         }
         Err(NoStep::TooLong)
