@@ -155,6 +155,11 @@ impl Robot {
         joints
     }
 
+    /// Those of [`Robot::joints_to`] that are not fixed: of two links with the same ones, none moves over the other.
+    pub fn moving_joints_to(&self, link: LinkId) -> Vec<JointId> {
+        self.joints_to(link).into_iter().filter(|id| self.joints[id.0].moves()).collect()
+    }
+
     /// Pose of `link` in the frame of the last moving link on the way to it (or of the root), which it is fixed to.
     pub fn fixed_pose_in_body(&self, link: LinkId) -> Pose {
         let joints = self.joints_to(link).into_iter().rev();

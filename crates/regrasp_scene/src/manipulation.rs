@@ -7,7 +7,7 @@ use crate::state::State;
 use regrasp_geometry::Pose;
 use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::shape::PlacedShape;
-use regrasp_robot::{Hand, JointKind, LinkId, Manipulator, Part};
+use regrasp_robot::{Hand, LinkId, Manipulator, Part};
 
 /// One hand and the object that it manipulates. All else of the scene rests in `state`.
 #[derive(Debug, Clone, Copy)]
@@ -123,11 +123,7 @@ pub fn is_of_hand(scene: &Scene, hand: usize, link: LinkId) -> bool {
 
 /// True when no moving joint lies between `link` and the base of a hand: such a link of an arm counts as part of the palm.
 pub(crate) fn is_rigid_with_hand(robot: &Manipulator, hand: usize, link: LinkId) -> bool {
-    let moving = |link| {
-        let joints = robot.robot.joints_to(link).into_iter();
-        joints.filter(|id| robot.robot.joints[id.0].kind != JointKind::Fixed).collect::<Vec<_>>()
-    };
-    moving(link) == moving(robot.hands[hand].hand.base)
+    robot.robot.moving_joints_to(link) == robot.robot.moving_joints_to(robot.hands[hand].hand.base)
 }
 
 /// The collision shapes of a hand in a posture, placed in the world, but for links of its palm that `leave_out` names.

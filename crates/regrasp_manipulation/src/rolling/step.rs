@@ -50,7 +50,7 @@ const PREFERENCE_WEIGHT: f64 = 0.2;
 /// lose twice as many.
 const PREFERENCE_DAMPING: f64 = 1.0;
 
-/// How far off the end of a coarse step may be, in metres.
+/// How far off the end of a coarse step may be, in metres: little beside what a finger reaches, which is all that is asked there.
 const COARSE: f64 = 1e-5;
 
 /// Corrections of a step by the slip seen over its halves.
@@ -205,7 +205,8 @@ impl<'a> RollStep<'a> {
     }
 
     /// Joints without slip at the end of the step, by the midpoint rule, less what is known of its error. Soft fingertips
-    /// with a joint to spare also turn along with the object. The end may be off by `tolerance`, in metres, or what the inverse kinematics allow.
+    /// with a joint to spare also turn along with the object. The end may be off by `tolerance`, in metres, or by
+    /// what the inverse kinematics allow where that is more.
     fn solve(&self, near: &Coordinates, (settings, tolerance): (&IkSettings, f64), error: &Slipped) -> Option<Rolled> {
         let finger = &self.model.fingers[self.finger];
         let turns_along = self.model.resists_spin(self.finger) && finger.ik.is_redundant();

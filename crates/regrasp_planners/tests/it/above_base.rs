@@ -11,8 +11,8 @@ use regrasp_scene::{LoadedScene, load_scene};
 /// Where the wrist is held: the limits of its joint leave nothing nearer to zero.
 const WRIST: f64 = 0.2;
 
-/// The bundled box turned by 90 degrees about z in the wide hand, which hangs on a wrist. The peg stands at `peg` of the palm's frame, its lower
-/// end at the height 100 mm: 8 mm below the top of the box.
+/// The bundled box turned by 90 degrees about z in the wide hand, which hangs on a wrist. The peg hangs over the point `peg` of the palm, in
+/// metres; its lower end is at the height 100 mm, 8 mm below the top of the box.
 fn scene(peg: [f64; 2]) -> LoadedScene {
     let assets = repository().join("assets/hands/wide_four_finger");
     let read = |path| std::fs::read_to_string(path).unwrap();
@@ -48,6 +48,8 @@ fn the_planner_keeps_clear_of_what_hangs_above_the_base() {
 
     let query = loaded.tasks[0].query(0);
     let world = (&loaded.scene, &loaded.state);
+    // The same scene with the peg in the way of these plans.
+    let other = scene([0.02 * azimuth.cos(), 0.02 * azimuth.sin()]);
     let mut n_plans = 0;
     for seed in 0..4 {
         let budget = Budget::work(2_000_000);
@@ -55,8 +57,6 @@ fn the_planner_keeps_clear_of_what_hangs_above_the_base() {
         let report = check(world, Some(&query), &plan, &CheckSettings::default());
         assert!(report.accepted(), "seed {seed}: {:#?}", report.violations);
         n_plans += 1;
-        // The same plan where the peg hangs in its way.
-        let other = scene([0.02 * azimuth.cos(), 0.02 * azimuth.sin()]);
         let report = check((&other.scene, &other.state), Some(&query), &plan, &CheckSettings::default());
         assert!(report.violations.iter().any(|violation| violation.kind == ViolationKind::Collision), "seed {seed}");
     }

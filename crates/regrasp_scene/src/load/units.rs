@@ -8,7 +8,7 @@ use crate::query::{GRASP_TOLERANCE, GraspRequest};
 use crate::scene::SceneHand;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_geometry::{Point, Pose};
-use regrasp_robot::{Hand, JointKind};
+use regrasp_robot::Hand;
 
 /// Hand and object may differ in size by this factor (reliability R15).
 const MAX_SIZE_RATIO: f64 = 20.0;
@@ -130,18 +130,14 @@ fn finger_reach(finger: &regrasp_robot::Finger) -> f64 {
 
 /// Largest distance between two of: finger bases, fingertips at rest, palm shapes that move with the base; in metres.
 pub(super) fn size_of(hand: &Hand) -> f64 {
-    let robot = &hand.robot;
-    let moving_to = |link| {
-        let joints = robot.joints_to(link).into_iter();
-        joints.filter(|id| robot.joints[id.0].kind != JointKind::Fixed).collect::<Vec<_>>()
-    };
-    let to_base = moving_to(hand.base);
+    let to_base = hand.robot.moving_joints_to(hand.base);
+    let moves_with_base = |link| hand.robot.moving_joints_to(link).starts_with(&to_base);
     let mut points = Vec::new();
     for finger in &hand.fingers {
         points.extend(finger.chain.joints.first().map(|joint| Point::from(joint.parent_from_joint.translation.vector)));
         points.push(finger.chain.tip(&finger.rest, &finger.tip.center_in_body));
     }
-    for shape in hand.palm.iter().filter(|shape| moving_to(shape.link).starts_with(&to_base)) {
+    for shape in hand.palm.iter().filter(|shape| moves_with_base(shape.link)) {
         let (low, high) = shape.placed.shape.bounds();
         points.extend([low, high].map(|corner| shape.placed.parent_from_shape * corner));
     }

@@ -16,7 +16,7 @@ const MOST_STEPS: usize = 20;
 const MOST_HALVINGS: usize = 5;
 /// Longest step, in radians.
 const LONGEST_STEP: f64 = 0.4;
-/// A step that is shorter leads so near that nobody looks again.
+/// After a step that is shorter, in radians, nobody looks again: what is left falls with the square of the step.
 const LAST_STEP: f64 = 1e-7;
 /// How far the touching point may be off the normal, in metres.
 const OFF: f64 = 2e-16;
