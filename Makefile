@@ -55,8 +55,9 @@ endif
 
 test: test-rust test-python test-page
 
+# In the profile of what ships: with `make release` and `make python` all is compiled once.
 test-rust:
-	cargo test --locked --workspace
+	cargo test --release --locked --workspace
 
 # A fresh virtual environment with the package, installed by pip as users do. The build finds the crates compiled that
 # `make release` compiled. Says SKIPPED, and leaves no environment, where there is no Python of 3.10 or later, or where pip finds
@@ -97,7 +98,7 @@ test-page:
 	else cd $(PAGE) && npm run --silent check && npm test --silent; fi
 
 docs:
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --locked --workspace --no-deps
 
 # The generated pages and the figures of the book.
 reference:
