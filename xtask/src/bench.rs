@@ -7,9 +7,11 @@ use std::path::{Path, PathBuf};
 
 const RESULTS: &str = "docs/benchmarks";
 /// Sections of the page, in this order; those without a CSV file are left out.
-const SECTIONS: [&str; 18] = [
+const SECTIONS: [&str; 20] = [
     "rolling_wide",
     "rolling_allegro",
+    "rolling_stretch",
+    "rolling_shadow",
     "wide",
     "visibility",
     "classic",
@@ -82,7 +84,10 @@ pub fn all(_: &[String]) -> Outcome {
         let packages = package(&models);
         let seeds = number("ALLEGRO_SEEDS", 20)?;
         let of = |limit: u32| format!("{packages} --time-limit {limit} --seeds {seeds}");
+        let shadow = joined(&files("scenes/shadow", ".toml")?);
         bench(&program, &allegro(&REQUIRED), &of(20), "rolling_allegro")?;
+        bench(&program, &allegro(&STRETCH), &of(20), "rolling_stretch")?;
+        bench(&program, &shadow, &of(20), "rolling_shadow")?;
         bench(&program, &allegro(&REQUIRED), &format!("{PLAIN} {}", of(20)), "allegro_required")?;
         bench(&program, &allegro(&STRETCH), &format!("{PLAIN} {}", of(20)), "allegro_stretch")?;
         bench(&program, &allegro(&MESHES), &format!("{PLAIN} {}", of(20)), "allegro_meshes")?;
@@ -93,7 +98,7 @@ pub fn all(_: &[String]) -> Outcome {
             let soft: Vec<PathBuf> = all.into_iter().filter(is_soft).collect();
             bench(&program, &joined(&soft), &format!("{PLAIN} {}", of(6)), hand)?;
         }
-        bench(&program, &joined(&files("scenes/shadow", ".toml")?), &format!("{PLAIN} {}", of(20)), "shadow")?;
+        bench(&program, &shadow, &format!("{PLAIN} {}", of(20)), "shadow")?;
     }
     page(&[])
 }

@@ -106,15 +106,16 @@ fn measure(campaign: &Campaign, missing: VecDeque<Cell>, at_once: u64) -> Outcom
         fs::write(ROWS, format!("{HEADER}\n")).map_err(|error| format!("{ROWS} cannot be written: {error}"))?;
     }
     let waiting = Mutex::new(missing);
-    let file = OpenOptions::new().append(true).open(ROWS).map_err(|error| format!("{ROWS}: {error}"))?;
-    let file = Mutex::new(file);
+    // Opened for every cell: git may have put another file there since.
+    let rows_file = || OpenOptions::new().append(true).open(ROWS).map_err(|error| format!("{ROWS}: {error}"));
+    let writing = Mutex::new(());
     let work = || -> Outcome {
         loop {
             let Some(cell) = waiting.lock().unwrap_or_else(|held| held.into_inner()).pop_front() else { return Ok(()) };
             let rows = measured(campaign, &cell)?;
             eprint!("{rows}");
-            let mut file = file.lock().unwrap_or_else(|held| held.into_inner());
-            file.write_all(rows.as_bytes()).map_err(|error| format!("{ROWS}: {error}"))?;
+            let _one_at_a_time = writing.lock().unwrap_or_else(|held| held.into_inner());
+            rows_file()?.write_all(rows.as_bytes()).map_err(|error| format!("{ROWS}: {error}"))?;
         }
     };
     std::thread::scope(|scope| {
