@@ -10,7 +10,7 @@ type Features = BTreeMap<String, BTreeSet<String>>;
 
 fn features(of: &[&str]) -> Features {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let tree = ["tree", "--locked", "--offline", "--prefix", "none", "--format", "{p} {f}"];
+    let tree = ["tree", "--locked", "--prefix", "none", "--format", "{p} {f}"];
     let out = Command::new(env!("CARGO")).args(tree).args(of).current_dir(root).output().unwrap();
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let mut found = Features::new();

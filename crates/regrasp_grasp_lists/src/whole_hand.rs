@@ -1,5 +1,6 @@
 //! A hand that a robot carries, with all that its own file hangs on it: links above the hand's base, such as a forearm, move with
-//! the hand here, and must not hit the object either. The palm of a hand that stands by itself has them already. Joints on no finger rest at the allowed position nearest to zero.
+//! the hand here, and must not hit the object either. The palm of a hand that stands by itself has them already. Joints on no
+//! finger rest at the allowed position nearest to zero.
 
 use regrasp_geometry::Pose;
 use regrasp_geometry::shape::PlacedShape;
