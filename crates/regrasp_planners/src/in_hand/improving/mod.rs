@@ -126,8 +126,10 @@ const FEW_STEPS: usize = 8;
 const MOST_STEPS: usize = 16;
 const FEW_SHARE: f64 = 0.75;
 
-/// Share of the work that is left which one more search may take.
-const SHARE_AGAIN: u64 = 4;
+/// Share of the work that is left which one more search may take, and share of the improvement's work so far: where a clock ends
+/// the improvement, much work may seem left.
+const SHARE_OF_LEFT: u64 = 4;
+const SHARE_OF_SPENT: u64 = 2;
 
 /// A solution that costs no more than `first`, and what became of it. Whatever ends the search only ends the improvement.
 pub fn improve(search: &mut Search, legs: &Legs, first: Solution) -> (Solution, Improvement) {
@@ -154,7 +156,11 @@ pub fn improve(search: &mut Search, legs: &Legs, first: Solution) -> (Solution, 
             match ROLLING_ROUNDS[which % ROLLING_ROUNDS.len()] {
                 Rolling::Part => part(search, legs, &best, of_best, &mut rng),
                 Rolling::Whole(lay) => round(search, legs, &best, of_best, (lay, WHOLE), &mut rng),
-                Rolling::Again => Ok(search_beside(search, legs, &improvement)),
+                Rolling::Again => {
+                    let spent = search.workspace.work - work_before;
+                    let most = (search.work_left() / SHARE_OF_LEFT).min(spent / SHARE_OF_SPENT);
+                    Ok(search_beside(search, legs, &improvement, most))
+                }
             }
         });
         match better {
@@ -184,9 +190,14 @@ fn search_again(
     Ok((figures.cost < improvement.improved.cost).then_some((solution, figures)))
 }
 
-/// As [`search_again`], with a share of the work.
-fn search_beside(search: &mut Search, legs: &Legs, improvement: &Improvement) -> Option<(Solution, PlanFigures)> {
-    let mut beside = search.for_detour(improvement.rounds as usize, search.work_left() / SHARE_AGAIN);
+/// As [`search_again`], with at most so much work.
+fn search_beside(
+    search: &mut Search,
+    legs: &Legs,
+    improvement: &Improvement,
+    most_work: u64,
+) -> Option<(Solution, PlanFigures)> {
+    let mut beside = search.for_detour(improvement.rounds as usize, most_work);
     let solution = plan_legs(&mut beside, legs);
     search.workspace.work += beside.workspace.work;
     search.n_samples += beside.n_samples;
