@@ -15,9 +15,6 @@ use regrasp_scene::HandView;
 /// Directions across a link in which its width is measured.
 const DIRECTIONS: usize = 32;
 
-/// Share of the work for the try that asks for both; by hand.
-const SHARE_FOR_BOTH: f64 = 1.0 / 3.0;
-
 /// How many times longer the same work takes where fingertips that are meshes roll on meshes: with all of it, tries would take up
 /// to a minute there. Measured on scans in the LEAP hand: 135 to 190 microseconds a configuration, where the Allegro's balls take 3.
 const LONGER: u64 = 16;
@@ -46,18 +43,18 @@ pub fn first_tries(
     let can_keep = |finger: &Finger| stand_back(finger).is_none_or(|back| back >= 2.0 * wanted.clearance);
     let keeps_away = wanted.clearance > settings.physics.clearance && view.hand.fingers.iter().all(can_keep);
     let closes_more = wanted.closure_margin > settings.physics.closure_margin;
-    let with = |keeps_away: bool, closes_more: bool, share: f64| {
+    let with = |keeps_away: bool, closes_more: bool| {
         let clearance = if keeps_away { wanted.clearance } else { settings.physics.clearance };
         let closure_margin = if closes_more { wanted.closure_margin } else { settings.physics.closure_margin };
-        let work = ((most_work as f64 * share) as u64).min(budget.max_work / 4);
+        let work = most_work.min(budget.max_work / 4);
         let physics = PhysicsSettings { clearance, closure_margin, ..settings.physics.clone() };
         let search = SearchSettings { first_try: None, ..settings.search.clone() };
         (InHandSettings { physics, search, ..settings.clone() }, work)
     };
     match (keeps_away, closes_more) {
-        (true, true) => vec![with(true, true, SHARE_FOR_BOTH), with(true, false, 1.0)],
+        (true, true) => vec![with(true, true), with(true, false)],
         (false, false) => Vec::new(),
-        (keeps_away, closes_more) => vec![with(keeps_away, closes_more, 1.0)],
+        (keeps_away, closes_more) => vec![with(keeps_away, closes_more)],
     }
 }
 
@@ -150,7 +147,7 @@ mod tests {
         let with_start = first_tries(&view, &hurried, &Budget::work(1_000_000), true);
         assert_eq!(asked(&with_start), [(usual.physics.clearance, wanted.closure_margin, 140)]);
         let nearer = FirstTry { clearance: 0.0005, work: 90, ..wanted };
-        let both = [(0.0005, wanted.closure_margin, 30), (0.0005, usual.physics.closure_margin, 90)];
+        let both = [(0.0005, wanted.closure_margin, 90), (0.0005, usual.physics.closure_margin, 90)];
         assert_eq!(asked(&with(nearer)), both);
     }
 
