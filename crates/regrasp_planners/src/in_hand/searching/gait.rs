@@ -315,3 +315,45 @@ fn likest(search: &mut Search, state: &GraspState, all: &[Node], nodes: &[usize]
 fn from_the_start(growing: usize, way: Sequence) -> Sequence {
     if growing == 0 { way } else { way.reversed() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::in_hand::grasps::sample::draw_state;
+    use crate::in_hand::roadmap_tests::with_settings;
+    use crate::settings::InHandSettings;
+
+    /// Both grasps come to the same pose, with the contacts' fingers, also where neither can be taken to the other's pose.
+    #[test]
+    fn two_grasps_come_to_a_pose_between_them() {
+        with_settings("box_90x.toml", &InHandSettings::default(), |search| {
+            let states: Vec<GraspState> = (0..400).filter_map(|_| draw_state(search)).take(40).collect();
+            let [mut n_at_theirs, mut n_between] = [0; 2];
+            for (state, theirs) in states.iter().flat_map(|state| states.iter().map(move |theirs| (state, theirs))) {
+                if state.world_from_object == theirs.world_from_object {
+                    continue;
+                }
+                let Some((way, back)) = way_to_common_pose(search, state, theirs) else {
+                    let reaches = whole_transfer(search, state, &theirs.world_from_object).is_some();
+                    assert!(!reaches, "it can be taken there");
+                    continue;
+                };
+                assert_eq!((way.start(), back.start()), (state, theirs));
+                let common = way.end().world_from_object;
+                assert_eq!(common, back.end().world_from_object);
+                let to = |pose: &Pose| search.distance(&common, pose);
+                let [mine, other] = [&state.world_from_object, &theirs.world_from_object].map(to);
+                let whole = search.distance(&state.world_from_object, &theirs.world_from_object);
+                assert!((mine + other - whole).abs() < 1e-9 + 0.01 * whole, "{mine} + {other} = {whole}");
+                if other == 0.0 {
+                    n_at_theirs += 1;
+                } else {
+                    n_between += 1;
+                    let is_one_way = whole_transfer(search, state, &theirs.world_from_object).is_some();
+                    assert!(!is_one_way, "a way there is taken whole");
+                }
+            }
+            assert!(n_at_theirs > 0 && n_between > 0, "{n_at_theirs} {n_between}");
+        });
+    }
+}
