@@ -341,15 +341,15 @@ mod tests {
                 assert_eq!((way.start(), back.start()), (state, theirs));
                 let common = way.end().world_from_object;
                 assert_eq!(common, back.end().world_from_object);
-                let to = |pose: &Pose| search.distance(&common, pose);
-                let [mine, other] = [&state.world_from_object, &theirs.world_from_object].map(to);
-                let whole = search.distance(&state.world_from_object, &theirs.world_from_object);
+                let [from, to] = [&state.world_from_object, &theirs.world_from_object];
+                let [mine, other] = [from, to].map(|pose| search.distance(&common, pose));
+                let whole = search.distance(from, to);
                 assert!((mine + other - whole).abs() < 1e-9 + 0.01 * whole, "{mine} + {other} = {whole}");
-                if other == 0.0 {
+                if common == *to {
                     n_at_theirs += 1;
                 } else {
                     n_between += 1;
-                    let is_one_way = whole_transfer(search, state, &theirs.world_from_object).is_some();
+                    let is_one_way = whole_transfer(search, state, to).is_some();
                     assert!(!is_one_way, "a way there is taken whole");
                 }
             }
