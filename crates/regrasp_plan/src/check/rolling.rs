@@ -205,6 +205,13 @@ impl<'a> Roll<'a> {
         self.looked.get()
     }
 
+    /// Before a look at the step from its beginning to its end: a smooth hull touches first where the plan says, and is followed from
+    /// there. Where it nearly touches in two places, a guess from the end of the look before would lead to the other one, and its
+    /// way from there to the place where it touches would count as slip.
+    fn begin(&self) {
+        self.last_normal.set(self.planned[0]);
+    }
+
     fn object_from_link(&self, t: f64) -> Matrix4<f64> {
         self.looked.set(self.looked.get() + 1);
         let link = self.finger.path.world_from_link(&self.motion.joints_at(t));
@@ -313,7 +320,11 @@ impl<'a> Roll<'a> {
             let normal = self.touch(link)?.normal;
             Some((self.finger.point_facing(&-link.fixed_view::<3, 3>(0, 0).tr_mul(&normal)), normal))
         };
-        integral(|n_pieces| slide(&object_from_link, &touching, n_pieces), allowed)
+        let slide_in = |n_pieces| {
+            self.begin();
+            slide(&object_from_link, &touching, n_pieces)
+        };
+        integral(slide_in, allowed)
     }
 
     /// Slip of the step, of a round fingertip whose touching point slides so far.
@@ -328,6 +339,7 @@ impl<'a> Roll<'a> {
 
     /// How far the contact travels over the object, by chords of half a step; zero where no surface is near.
     pub fn travel(&self) -> f64 {
+        self.begin();
         let [start, middle, end] = [0.0, 0.5, 1.0].map(|t| self.contact(t).map(|(point, _)| point));
         let chord = |a: Option<Point>, b: Option<Point>| a.zip(b).map_or(0.0, |(a, b)| (b - a).norm());
         chord(start, middle) + chord(middle, end)
@@ -345,6 +357,7 @@ impl<'a> Roll<'a> {
 
     /// How the link turns over the object; none where no surface is near.
     pub fn turning(&self) -> Option<Turning> {
+        self.begin();
         let mut turning = Turning::default();
         let first = self.object_from_link(0.0);
         let mut before = first;
@@ -429,6 +442,8 @@ fn slide(object_from_link: &dyn Fn(f64) -> Matrix4<f64>, touching: &Touching, n_
     Some(sum)
 }
 
+#[cfg(test)]
+mod folds_tests;
 #[cfg(test)]
 mod tests {
     use super::*;

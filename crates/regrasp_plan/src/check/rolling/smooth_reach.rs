@@ -268,7 +268,7 @@ fn narrow(value: impl Fn(f64) -> f64) -> (f64, f64) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::check::surface::SortedShape;
     use crate::check::tip_surface::spread;
@@ -280,7 +280,7 @@ mod tests {
     use std::sync::Arc;
 
     /// A bar with flat faces, sharp rims and a rounded end.
-    fn bar() -> Smooth {
+    pub fn bar() -> Smooth {
         let mut points = Vec::new();
         for k in 0..25 {
             let (up, out) = (std::f64::consts::PI * f64::from(k) / 24.0).sin_cos();
@@ -300,7 +300,7 @@ mod tests {
     const N_CELLS: u32 = 40;
 
     /// A sheet of small triangles that folds everywhere, as scans do, over a hill.
-    fn folded(rng: &mut Rng, folds: f64) -> TriangleMesh {
+    pub fn folded(rng: &mut Rng, folds: f64) -> TriangleMesh {
         let half = 0.5 * f64::from(N_CELLS) * CELL;
         let mut vertices = Vec::new();
         for i in 0..=N_CELLS {
