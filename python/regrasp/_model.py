@@ -117,7 +117,9 @@ class Tip:
 
     link: str
     shape: str
-    """"point", "sphere" or "hull"."""
+    """"point", "sphere", "ellipsoid" or "hull"."""
+    surface: str
+    """What touches: "point", "sphere" or "ellipsoid", and of hulls that are no ellipsoid "smooth_hull"."""
     radius: float
     """Of a sphere; 0 for others."""
     contact: str

@@ -31,11 +31,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from ._model import Pose
-from ._session import Session
 from .execute.executor import Executor
 from .execute.planning import ThreadPlanning
 from .execute.plant import Command, Observation
-from .execute.settings import CAREFUL, FIRM, LOOSE, PLANNER, ExecutorSettings
+from .execute.sessions import ExecutorSessions
 from .simulate.reference import Array
 
 #: How long a driver may take to reach the next point of a trajectory, in ticks.
@@ -177,7 +176,8 @@ def main(arguments: list[str] | None = None) -> int:
     from ._model import load_scene
 
     scene = load_scene(asked.scene, packages=dict(entry.split("=", 1) for entry in asked.package))
-    session = Session(scene, settings=PLANNER)
+    sessions = ExecutorSessions.of(scene)
+    session = sessions.usual
     n_joints = len(session.hand.joint_names)
     stiffness, damping = np.full(n_joints, asked.stiffness), np.full(n_joints, asked.damping)
     rclpy.init()
@@ -203,17 +203,7 @@ def main(arguments: list[str] | None = None) -> int:
     node.create_subscription(types["PoseStamped"], "goal", goals.on_goal, 10)
     listener = threading.Thread(target=rclpy.spin, args=(node,), daemon=True)
     listener.start()
-    executor = Executor(
-        session,
-        plant,
-        ExecutorSettings(),
-        planning=ThreadPlanning,
-        careful=[Session(scene, settings=CAREFUL)],
-        loose=[Session(scene, settings=LOOSE)],
-        firm=[Session(scene, settings=FIRM)],
-        stiffness=stiffness,
-        damping=damping,
-    )
+    executor = Executor.of(sessions, plant, planning=ThreadPlanning, stiffness=stiffness, damping=damping)
     try:
         log = executor.run(goals)
         told.publish(types["String"](data=json.dumps({"status": log.status, "goals": [asdict(goal) for goal in log.goals]})))

@@ -4,7 +4,7 @@ use regrasp::geometry::{Pose, Shape};
 use regrasp::plan::plan::PoseData;
 use regrasp::robot::hand::Finger;
 use regrasp::robot::robot::{Joint, JointId, JointKind, Limits};
-use regrasp::robot::tip::TipShape;
+use regrasp::robot::tip::{HullSurface, TipShape};
 use regrasp::robot::{ContactModel, Hand};
 use regrasp::scene::{Gravity, InputFile, LoadedScene, Object, Obstacle, Query, Scene, SceneHand, Task};
 use serde_json::{Value, json};
@@ -114,6 +114,11 @@ fn finger(hand: &Hand, finger: &Finger) -> Value {
         TipShape::Ellipsoid(_) => "ellipsoid",
         TipShape::Hull { .. } => "hull",
     };
+    let surface = match &finger.tip.shape {
+        TipShape::Hull { surface: HullSurface::Smooth(_), .. } => "smooth_hull",
+        TipShape::Hull { surface: HullSurface::Ellipsoid(_), .. } => "ellipsoid",
+        _ => shape,
+    };
     json!({
         "name": finger.name,
         "joint_names": finger.chain.names,
@@ -121,6 +126,7 @@ fn finger(hand: &Hand, finger: &Finger) -> Value {
         "tip": {
             "link": hand.robot.links[finger.tip.link.0].name,
             "shape": shape,
+            "surface": surface,
             "radius": finger.tip.radius(),
             "contact": finger.tip.contact.name(),
             "torsion_radius": torsion_radius,

@@ -21,12 +21,14 @@ if TYPE_CHECKING:
     from .log import Event, GoalResult, RunLog
     from .mujoco_plant import MujocoPlant, PlantSettings
     from .plant import Command, Observation, Plant
+    from .sessions import ExecutorSessions
     from .settings import ExecutorSettings
 
 __all__ = [
     "Command",
     "Event",
     "Executor",
+    "ExecutorSessions",
     "ExecutorSettings",
     "FaultyPlant",
     "ForeignPlant",
@@ -45,6 +47,7 @@ _HOMES = {
     "Command": "plant",
     "Event": "log",
     "Executor": "executor",
+    "ExecutorSessions": "sessions",
     "ExecutorSettings": "settings",
     "FaultyPlant": "faults",
     "ForeignPlant": "foreign_plant",

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from .._model import load_scene
-from .._session import Session
 from ..simulate.model import Settings
 from ..simulate.reference import PlanError
 from .executor import Executor
 from .goals import turns
 from .mujoco_plant import MujocoPlant, PlantSettings
-from .settings import CAREFUL, FIRM, LOOSE, PLANNER, ExecutorSettings
+from .sessions import ExecutorSessions
+from .settings import ExecutorSettings
 
 #: How the plant differs from the plan.
 DISTURBANCES: dict[str, dict[str, Any]] = {
@@ -113,8 +113,7 @@ def run_case(case: Case) -> Row:
         return replace(base, status="no_plan", message=str(error))
     axis = None if not case.axis else np.eye(3)["xyz".index(case.axis)]
     goals = turns(plant.pose, count=case.goals, seed=case.run, largest=case.largest, axis=axis)
-    session = Session(scene, settings=PLANNER)
-    executor = Executor(session, plant, settings, careful=[Session(scene, settings=CAREFUL)], loose=[Session(scene, settings=LOOSE)], firm=[Session(scene, settings=FIRM)])
+    executor = Executor.of(ExecutorSessions.of(scene), plant, settings)
     log = executor.run(goals)
     position, _ = plant.truth()
     away = float(np.linalg.norm(position - np.array(log.goals[-1].position))) if log.goals else 0.0

@@ -20,7 +20,8 @@ from .monitor import HOLDING, Monitor, Trigger, pose_error, why_gone
 from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
 from .plant import Command, Plant
 from .senses import Fault, Senses
-from .settings import CAREFUL, FIRM, LOOSE, PLANNER, ExecutorSettings
+from .sessions import ExecutorSessions
+from .settings import ExecutorSettings
 
 #: A sample is kept every so many ticks.
 SAMPLED = 5
@@ -100,6 +101,12 @@ class Executor:
         self._n_ticks = 0
         self._faults: dict[str, float] = {}
         self.log = RunLog(scene=session.scene.name, settings=asdict(self._settings))
+
+    @classmethod
+    def of(cls, sessions: ExecutorSessions, plant: Plant, settings: ExecutorSettings | None = None, **more: Any) -> Executor:
+        """With all sessions of a scene. more: as of `Executor`."""
+        all_of_it: dict[str, Any] = {"careful": [sessions.careful], "loose": [sessions.loose], "firm": [sessions.firm], **more}
+        return cls(sessions.usual, plant, settings, **all_of_it)
 
     # ------------------------------------------------------------------------------------------------------------- whole runs
 
@@ -556,14 +563,9 @@ def execute(
 
     session: of the plant's scene; a plant in MuJoCo knows its scene. The planner then has the settings of execution.
     """
-    careful: list[Session] = []
-    loose: list[Session] = []
-    firm: list[Session] = []
-    if session is None:
-        scene = getattr(plant, "scene", None)
-        if scene is None:
-            raise ValueError("the plant does not know its scene: give a session")
-        session = Session(scene, settings=PLANNER)
-        careful, loose = [Session(scene, settings=CAREFUL)], [Session(scene, settings=LOOSE)]
-        firm = [Session(scene, settings=FIRM)]
-    return Executor(session, plant, settings, careful=careful, loose=loose, firm=firm).run(goals)
+    if session is not None:
+        return Executor(session, plant, settings).run(goals)
+    scene = getattr(plant, "scene", None)
+    if scene is None:
+        raise ValueError("the plant does not know its scene: give a session")
+    return Executor.of(ExecutorSessions.of(scene), plant, settings).run(goals)

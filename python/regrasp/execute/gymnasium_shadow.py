@@ -21,7 +21,8 @@ from ..from_mjcf import convert
 from .executor import Executor
 from .foreign_plant import ForeignPlant, ForeignSettings
 from .goals import turns
-from .settings import CAREFUL, FIRM, LOOSE, PLANNER, ExecutorSettings
+from .sessions import ExecutorSessions
+from .settings import CAREFUL, LOOSE, ExecutorSettings
 
 MODEL = "envs/assets/hand/manipulate_block.xml"
 #: A tendon with 0.001 m of play couples the last two joints of four fingers. Under load it rests at one end; in radians of the last joint.
@@ -101,13 +102,12 @@ def main(arguments: list[str] | None = None) -> int:
         followers={f"robot0:{finger}J0": (f"robot0:{finger}J1", RATIO, PLAY) for finger in ("FF", "MF", "RF", "LF")},
         settings=ForeignSettings(seed=asked.seed, impratio=asked.impratio),
     )
-    executor = Executor(
-        Session(scene, settings=PLANNER),
+    sessions = ExecutorSessions.of(scene)
+    executor = Executor.of(
+        sessions,
         plant,
         SETTINGS,
-        careful=[Session(scene, settings=CAREFUL)],
-        loose=[Session(scene, settings=LOOSE), Session(crept, settings=LOOSE)],
-        firm=[Session(scene, settings=FIRM)],
+        loose=[sessions.loose, Session(crept, settings=LOOSE)],
         stiffness=plant.stiffness,
         damping=plant.damping,
     )

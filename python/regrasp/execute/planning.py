@@ -11,7 +11,7 @@ from .._model import Pose
 from .._plan import Plan
 from .._result import Failure
 from .._session import Session, Start
-from .settings import ExecutorSettings
+from .settings import ExecutorSettings, work_share
 
 
 class Cancelled(Exception):
@@ -91,18 +91,20 @@ def _solve(sessions: Sessions, settings: ExecutorSettings, prepare: Prepare, tic
     for attempt, session in enumerate(tries):
         answer = ask(session, attempt)
         if isinstance(answer, Plan):
-            answer = _shortest(answer, lambda number: ask(session, len(tries) + number), ticket, settings)
+            most_work = work_share(session.hand) * settings.choice_work
+            answer = _shortest(answer, lambda number: ask(session, len(tries) + number), ticket, (settings.choices, most_work))
             ticket.prepared = prepare(answer)
             break
     ticket.answer = answer
 
 
-def _shortest(plan: Plan, ask: Callable[[int], Plan | Failure], ticket: Ticket, settings: ExecutorSettings) -> Plan:
-    """The plan whose motion takes the least time, of this one and of others while the work that may be spent on them lasts."""
+def _shortest(plan: Plan, ask: Callable[[int], Plan | Failure], ticket: Ticket, limits: tuple[int, float]) -> Plan:
+    """The plan whose motion takes the least time, of this one and of others: so many in all, while so much work lasts."""
+    choices, most_work = limits
     best, each = plan, ticket.work
-    for number in range(settings.choices - 1):
+    for number in range(choices - 1):
         # What one more is likely to take; a motion of the object alone is as short as can be.
-        if ticket.work + each > settings.choice_work or best.statistics["relocations"] == 0:
+        if ticket.work + each > most_work or best.statistics["relocations"] == 0:
             break
         before = ticket.work
         other = ask(number)
@@ -123,7 +125,8 @@ class ChargedPlanning:
     def ask(self, start: Start, goal: Pose, seed: int, now: float, first: Sessions = ()) -> Ticket:
         ticket = Ticket(start, goal, now)
         _solve([*first, *self._sessions], self._settings, self._prepare, ticket, seed)
-        ticket.ready_at = now + ticket.work / self._settings.work_rate + self._settings.planning_overhead
+        rate = work_share(self._sessions[0].hand) * self._settings.work_rate
+        ticket.ready_at = now + ticket.work / rate + self._settings.planning_overhead
         return ticket
 
     def is_ready(self, ticket: Ticket, now: float) -> bool:

@@ -1,0 +1,36 @@
+"""The sessions that execution plans with: one scene, opened with the settings of ``settings``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .._model import Scene
+from .._session import Session
+from .settings import CAREFUL, FIRM, LOOSE, PLANNER, work_share
+
+
+@dataclass(frozen=True)
+class ExecutorSessions:
+    """What `Executor` asks for plans, in the order of ``firm`` where the grip is firm, ``careful``, ``usual``, ``loose``."""
+
+    usual: Session
+    careful: Session
+    """More room for friction that is lower than thought."""
+    loose: Session
+    """For starts that are worse than plans may be."""
+    firm: Session
+    """A firmer grip."""
+
+    @classmethod
+    def of(cls, scene: Scene) -> ExecutorSessions:
+        """Of the first task of ``scene``. Errors: as of `Session`."""
+        hand = next(hand for hand in scene.hands if hand.name_in_scene == scene.tasks[0].hand)
+        settings = (planner_settings(kind, work_share(hand)) for kind in (PLANNER, CAREFUL, LOOSE, FIRM))
+        return cls(*(Session(scene, settings=kind) for kind in settings))
+
+
+def planner_settings(settings: Mapping[str, Any], share: float) -> dict[str, Any]:
+    """The same with so much of the work for better plans."""
+    return {**settings, "improve_work": round(share * settings["improve_work"])}
