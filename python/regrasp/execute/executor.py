@@ -468,7 +468,7 @@ class Executor:
             distance, angle = pose_error(leg, self._senses.position, self._senses.quat, position, quat)
             waited = self._senses.time - since
             is_there = distance <= settings.settled_distance and angle <= settings.settled_turn
-            if (is_there and waited >= 0.1) or waited >= settings.settle_time:
+            if (is_there and waited >= settings.settled_after) or waited >= settings.settle_time:
                 return distance, angle
             self._tick(moves=False, state="settle")
 

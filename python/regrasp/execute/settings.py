@@ -54,8 +54,11 @@ class ExecutorSettings:
     """At the end of a leg the executor waits for feedback to bring the object this near,"""
     settled_turn: float = float(np.radians(0.8))
     """and as near as this angle, and goes on from there with the next leg as it was planned,"""
+    settled_after: float = 0.5
+    """but for at least this: of what the estimate of the pose did not know when the motion ended (``pose_time_constant``) a twelfth is
+    left then,"""
     settle_time: float = 1.0
-    """but for no longer than this."""
+    """and for no longer than this."""
     rest_time: float = 0.25
     """Rest before a state counts as observed, for noise to average out."""
     blend_time: float = 0.15
