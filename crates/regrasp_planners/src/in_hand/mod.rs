@@ -175,7 +175,8 @@ fn plan_with(asked: &Asked, settings: &InHandSettings, whole: &Budget, first_wor
             let first = with_counts(plan, left.statistics(n_restarts));
             let winner = AtomicUsize::new(usize::MAX);
             let context = Context { model: &model, settings, seed, budget: whole, winner: &winner, progress };
-            Ok(improved(context, &legs, query, solution, first))
+            let (solution, plan) = improved(context, &legs, query, solution, first);
+            Ok(with_better_end(context, &legs, query, &solution, plan))
         }
         Err((interrupt, left, n_attempts)) => {
             let failure = left.failure(&model, &poses, interrupt, n_attempts);
@@ -198,31 +199,66 @@ fn work_limits(model: &Model, settings: &InHandSettings, legs: &Legs, budget: &B
 /// Work after which a hand that cannot change its grasp is refused: some thousand grasps and transfers. By hand.
 const TRANSFERS_WORK: u64 = 40_000;
 
-/// The plan of a solution after the improvement that the settings ask for; the same plan where what is better geometry
-/// leaves no forces.
-fn improved(context: Context, legs: &Legs, query: &InHandQuery, solution: Solution, mut plan: Plan) -> Plan {
+/// A solution and its plan after the improvement that the settings ask for; the same where what is better geometry leaves no forces.
+fn improved(
+    context: Context,
+    legs: &Legs,
+    query: &InHandQuery,
+    solution: Solution,
+    mut plan: Plan,
+) -> (Solution, Plan) {
     let Context { model, settings, seed, budget, .. } = context;
     let is_stuck = legs.goal_grasp.is_none() && refusals::is_stuck(model, solution.way.end());
     let asked = settings.improvement.improve_work.max(shortening_work(model, settings, (legs, is_stuck), &plan));
     let work = asked.min(budget.max_work.saturating_sub(plan.statistics.work));
     if asked == 0 {
-        return plan;
+        return (solution, plan);
     }
     let budget = if settings.improvement.improve_work == 0 { budget.clone() } else { budget.of_improvement() };
     let ends = [legs.poses[0], legs.poses[legs.n_legs()]];
     let mut search = Search::new(Context { budget: &budget, ..context }, ends, 0, work);
     search.rng = Rng::keyed(seed, "improvement", 0);
-    let (solution, mut improvement) = improving::improve(&mut search, legs, solution);
+    let (better, mut improvement) = improving::improve(&mut search, legs, solution.clone());
     let mut counts = plan.statistics.clone();
-    match record::record(model, settings, query, seed, &solution, Statistics::default()) {
-        Ok(better) => plan = better,
-        Err(_) => improvement.improved = improvement.first,
-    }
+    let solution = match record::record(model, settings, query, seed, &better, Statistics::default()) {
+        Ok(plan_of_better) => {
+            plan = plan_of_better;
+            better
+        }
+        Err(_) => {
+            improvement.improved = improvement.first;
+            solution
+        }
+    };
     counts.work += improvement.work;
     counts.samples += search.n_samples;
     counts.cut_by_time |= search.cut_by_time;
     counts.improvement = Some(Box::new(improvement));
-    with_counts(plan, counts)
+    (solution, with_counts(plan, counts))
+}
+
+/// The plan of `solution`, with relocations at its end where the settings ask for more closure margin there; the same plan where
+/// none are found, where they leave no forces, and where the query gives the goal grasp.
+fn with_better_end(context: Context, legs: &Legs, query: &InHandQuery, solution: &Solution, plan: Plan) -> Plan {
+    let Context { model, settings, seed, budget, .. } = context;
+    let (margin, work) = (settings.improvement.end_margin, budget.max_work.saturating_sub(plan.statistics.work));
+    if margin == 0.0 || legs.goal_grasp.is_some() || query.stays() || work == 0 {
+        return plan;
+    }
+    let ends = [legs.poses[0], legs.poses[legs.n_legs()]];
+    let mut search = Search::new(context, ends, 0, work);
+    search.rng = Rng::keyed(seed, "ending", 0);
+    let end = solution.way.end();
+    let more = improving::ending::better_end(&mut search, end, margin);
+    let mut counts = plan.statistics.clone();
+    counts.work += search.workspace.work;
+    counts.samples += search.n_samples;
+    let longer = more.and_then(|more| {
+        let way = solution.way.clone().then(more)?;
+        let longer = Solution { way, steps_to_way: solution.steps_to_way.clone() };
+        record::record(model, settings, query, seed, &longer, Statistics::default()).ok()
+    });
+    with_counts(longer.unwrap_or(plan), counts)
 }
 
 /// Work after which a long plan is left as it is where nobody asks for a better one; 0 for plans that are not long. A plan that ends

@@ -69,6 +69,7 @@ flat! {
         improve_work: u64,
         long_plan: u64,
         shorten_share: f64,
+        end_margin: f64,
         cost: CostWeights,
         forces: Option<ForceSettings>,
         speed: SpeedSettings,
@@ -87,7 +88,7 @@ flat! {
         alpha, guided_share, edge_crossings, finger_ways,
     }
     improvement: ImprovementSettings {
-        improve_work, long_plan, shorten_share, cost,
+        improve_work, long_plan, shorten_share, end_margin, cost,
     }
 }
 

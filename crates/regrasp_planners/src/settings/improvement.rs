@@ -50,12 +50,21 @@ pub struct ImprovementSettings {
     /// Work spent on shortening a long plan, as a share of the work that found it, at least 20,000; 0 for none. By measurement:
     /// with 0.25 allegro/cube57_x falls from 38 to 8 relocations for a twentieth more time.
     pub shorten_share: f64,
+    /// Least closure margin of the grasp that a plan ends with, for plans that another one goes on from; 0 for none. Where the
+    /// grasp at the goal is the planner's choice and holds less, fingers are relocated there until it holds so much, if that is found.
+    pub end_margin: f64,
     /// Weights of the cost that improvement reduces.
     pub cost: CostWeights,
 }
 
 impl Default for ImprovementSettings {
     fn default() -> Self {
-        ImprovementSettings { improve_work: 0, long_plan: 12, shorten_share: 0.5, cost: CostWeights::default() }
+        ImprovementSettings {
+            improve_work: 0,
+            long_plan: 12,
+            shorten_share: 0.5,
+            end_margin: 0.0,
+            cost: CostWeights::default(),
+        }
     }
 }

@@ -119,6 +119,7 @@ impl InHandSettings {
             ("guided_share", self.baselines.guided_share),
             ("free_share", self.search.free_share),
             ("shorten_share", self.improvement.shorten_share),
+            ("end_margin", self.improvement.end_margin),
         ] {
             if !(0.0..=1.0).contains(&value) {
                 return Err(format!("{name} is {value}; it must be between 0 and 1"));

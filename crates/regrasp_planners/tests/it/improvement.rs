@@ -4,6 +4,7 @@ use crate::in_hand_methods::scene;
 use crate::queries::Queries;
 use regrasp_base::Budget;
 use regrasp_geometry::{Pose, frame, interpolate_pose};
+use regrasp_plan::check::closure::{HeldBody, margin};
 use regrasp_plan::check::{CheckSettings, Level};
 use regrasp_plan::plan::{Improvement, Waypoint};
 use regrasp_plan::{Plan, SegmentKind};
@@ -262,4 +263,55 @@ fn the_methods_of_the_paper_are_improved_under_their_release_rule() {
             assert!(margin >= recorded.physics.closure_margin, "finger {away} could not be let go: {margin}");
         }
     }
+}
+
+/// Closure margin of the grasp that a plan ends with, by the checker's own bound.
+fn margin_at_end(loaded: &LoadedScene, plan: &Plan) -> f64 {
+    let end = plan.segments.last().unwrap().waypoints.last().unwrap();
+    let grips: Vec<_> = end
+        .contacts
+        .iter()
+        .filter_map(|contact| Some((contact.point_in_object?, contact.normal_in_object?)))
+        .map(|(point, normal)| regrasp_grasp::Grip {
+            contact: regrasp_grasp::Contact {
+                point_in_object: point.into(),
+                normal_in_object: regrasp_geometry::UnitVector::new_normalize(normal.into()),
+            },
+            model: regrasp_grasp::ContactModel::Point,
+        })
+        .collect();
+    margin(&grips, &HeldBody::of(&loaded.scene.objects[0], plan))
+}
+
+#[test]
+fn plans_end_with_the_margin_that_is_asked_for_and_given_grasps_stay() {
+    let loaded = scene("sphere_90x.toml");
+    let (mut n_weak, mut n_better) = (0, 0);
+    for seed in 0..12 {
+        let query = loaded.in_hand(seed);
+        let as_found = plan(&loaded, &query, &settings(0), seed);
+        let before = margin_at_end(&loaded, &as_found);
+        let mut asked = settings(0);
+        asked.improvement.end_margin = 0.08;
+        let better = plan(&loaded, &query, &asked, seed);
+        let after = margin_at_end(&loaded, &better);
+        if before >= 0.08 {
+            assert_eq!(better.segments, as_found.segments, "nothing to be mended");
+            continue;
+        }
+        n_weak += 1;
+        n_better += u32::from(after >= 0.08);
+        let n_more = better.n_relocations() - as_found.n_relocations();
+        assert!(after >= 0.08 || n_more == 0, "seed {seed}: {n_more} more relocations, from {before} to {after}");
+        assert_eq!(better.segments[..as_found.segments.len()], as_found.segments[..], "what leads there stays");
+        let again = plan(&loaded, &query, &InHandSettings { n_threads: 8, ..asked.clone() }, seed);
+        assert!(again == better, "seed {seed}: another plan on 8 threads");
+
+        // Who names the grasp at the goal gets that.
+        let last = as_found.segments.last().unwrap().waypoints.last().unwrap().joints.clone();
+        let given = InHandQuery { goal_grasp: GraspRequest::Joints(last.clone()), ..query };
+        let there = plan(&loaded, &given, &asked, seed);
+        assert_eq!(there.segments.last().unwrap().waypoints.last().unwrap().joints, last, "not one bit off");
+    }
+    assert!(n_weak >= 4 && 2 * n_better >= n_weak, "{n_better} of {n_weak}");
 }

@@ -15,6 +15,8 @@ mod closure;
 mod cost;
 /// Ways of the object.
 mod course;
+/// The grasp at the end.
+pub mod ending;
 /// A first look at queries that give the start grasp.
 pub mod first_look;
 /// The cheapest gait along a course.

@@ -27,6 +27,7 @@ impl Legs<'_> {
 }
 
 /// The motions of all legs.
+#[derive(Clone)]
 pub struct Solution {
     /// The motions, one leg after the other.
     pub way: Sequence,
