@@ -337,7 +337,7 @@ class Executor:
         return (
             distance > settings.settled_distance
             or angle > settings.settled_turn
-            or slip > 0.5 * settings.slip_distance
+            or slip > 0.5 * leg.slip_limit(settings)
         )
 
     # ---------------------------------------------------------------------------------------------------------------- motion

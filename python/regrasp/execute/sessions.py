@@ -8,7 +8,7 @@ from typing import Any
 
 from .._model import Scene
 from .._session import Session
-from .settings import CAREFUL, FIRM, LOOSE, PLANNER, work_share
+from .settings import FIRM, LOOSE, PLANNER, careful_settings, work_share
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,9 @@ class ExecutorSessions:
     def of(cls, scene: Scene) -> ExecutorSessions:
         """Of the first task of ``scene``. Errors: as of `Session`."""
         hand = next(hand for hand in scene.hands if hand.name_in_scene == scene.tasks[0].hand)
-        settings = (planner_settings(kind, work_share(hand)) for kind in (PLANNER, CAREFUL, LOOSE, FIRM))
+        moved = next(entry for entry in scene.objects if entry.name == scene.tasks[0].object)
+        kinds = (PLANNER, careful_settings(moved), LOOSE, FIRM)
+        settings = (planner_settings(kind, work_share(hand)) for kind in kinds)
         return cls(*(Session(scene, settings=kind) for kind in settings))
 
 
