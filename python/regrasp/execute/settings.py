@@ -20,8 +20,8 @@ PLANNER: dict[str, Any] = {
 CAREFUL: dict[str, Any] = {**PLANNER, "friction_margin": 2.0}
 #: These instead of ``CAREFUL`` for spheres and ellipsoids, which are soon squeezed out of the hand where fingertips slip. The grip is
 #: firmer: a fingertip that is not quite where it should be pushes along the surface, and slips less the more it presses. And the next
-#: plan begins with the grasp that one ends with, so that must hold well. By measurement, friction 0.7 of the scene's: 8 runs of a
-#: sphere had 3 drops without, none with these and ``slip_turn``; but a cube in the Allegro hand was given up or dropped with these.
+#: plan begins with the grasp that one ends with, so that must hold well. By measurement with friction 0.7 of the scene's:
+#: docs/benchmarks/execute.md. A cube in the Allegro hand was given up or dropped with these.
 CAREFUL_ROUND: dict[str, Any] = {**CAREFUL, "forces": {"squeeze": 6.0}, "end_margin": 0.02}
 #: The same for starts that are worse than plans may be: links may be nearer to what they must not touch, grasps may hold less.
 LOOSE: dict[str, Any] = {**PLANNER, "clearance": 2e-5, "closure_margin": 0.001}
