@@ -70,7 +70,7 @@ class Executor:
         """
         self._session = session
         self._plant = plant
-        self._settings = settings or ExecutorSettings()
+        self._settings = (settings or ExecutorSettings()).for_object(session.object)
         base = control or Settings(hold_time=0.0)
         self._control = Settings(
             controller="C2" if self._settings.feedback else "B",
@@ -337,7 +337,7 @@ class Executor:
         return (
             distance > settings.settled_distance
             or angle > settings.settled_turn
-            or slip > 0.5 * leg.slip_limit(settings)
+            or slip > 0.5 * settings.slip_distance
         )
 
     # ---------------------------------------------------------------------------------------------------------------- motion

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .._plan import CONTACT_MODES, Plan
+from .._plan import Plan
 from .._planning import export_mjcf
 from ..simulate._mujoco import mujoco
 from ..simulate.controllers import Controller, Feedback
@@ -16,11 +16,6 @@ from ..simulate.model import Rig, Settings, make_rig, normals_in_world, with_pla
 from ..simulate.plans import flat
 from ..simulate.reference import Array, Reference, reference, rotation_matrices
 from .plant import Command
-from .settings import ExecutorSettings
-
-
-#: A fingertip that rolls, in ``Plan.contact_modes``.
-ROLLS = CONTACT_MODES.index("rolling")
 
 
 def first_rig(plan: Plan, settings: Settings, stiffness: Array | None = None, damping: Array | None = None) -> Rig:
@@ -51,8 +46,6 @@ class Leg:
         self._twists = _object_twists(self.rig, self.ref, jacobians, contacts)
         self._tips = self.ref.blend(_tips_in_object(self.rig))
         self._normals = self.ref.blend(_normals_in_object(self.rig))
-        self.curvature = curvature_seen(plan)
-        """Of the object where fingertips roll, in 1/m; zero where it is flat, and where none rolls."""
         self._qpos = self.rig.configurations[0].copy()
         self._data: Any = mujoco.MjData(self.rig.model)
         model = self.rig.model
@@ -95,11 +88,6 @@ class Leg:
         mujoco.mj_kinematics(model, data)
         return data.site_xpos[[finger.site for finger in self.rig.fingers]].copy()
 
-    def slip_limit(self, settings: ExecutorSettings) -> float:
-        """How far a fingertip may be from its place on the object, in metres: less where the object is round."""
-        turned = settings.slip_turn / self.curvature if self.curvature > 0.0 else np.inf
-        return min(settings.slip_distance, turned)
-
     def slips(self, k: int, tips: Array, position: Array, quat_wxyz: Array) -> Array:
         """How far every fingertip is from its planned place over the object, along the surface, in the object frame: shape
         (n_fingers, 3); zero for those that do not hold."""
@@ -108,17 +96,6 @@ class Leg:
         normals = self._normals[k]
         across = off - (off * normals).sum(axis=1, keepdims=True) * normals
         return np.where(self.ref.holds[k][:, None], across, 0.0)
-
-
-def curvature_seen(plan: Plan) -> float:
-    """Curvature of the object where fingertips roll over it, in 1/m: the median of how far the normal turns along the way of a contact,
-    over all steps. Zero where no fingertip rolls farther than a hundredth of a millimetre."""
-    rolls = (plan.contact_modes[1:] == ROLLS) & (plan.contact_modes[:-1] == ROLLS)
-    ways = np.linalg.norm(np.diff(plan.contact_points_in_object, axis=0), axis=2)
-    turns = np.linalg.norm(np.diff(plan.contact_normals_in_object, axis=0), axis=2)
-    with np.errstate(invalid="ignore"):
-        counts = rolls & (ways > 1e-5)
-    return float(np.median(turns[counts] / ways[counts])) if counts.any() else 0.0
 
 
 def _object_twists(rig: Rig, ref: Reference, jacobians: Array, contacts: Array) -> Array:

@@ -43,7 +43,6 @@ class Monitor:
         """start: the tick of ``joints_at_start``."""
         self._leg = leg
         self._settings = settings
-        self._slip_limit = leg.slip_limit(settings)
         n = len(leg.rig.fingers)
         self._lost_since = np.full(n, np.nan)
         self._stalled_since = np.full(len(leg.rig.joint_names), np.nan)
@@ -95,7 +94,7 @@ class Monitor:
             and angle <= share * settings.deviation_turn
             and (error <= settings.resume_share * settings.stall_error + self._usual_error).all()
             and (senses.forces is None or (senses.forces >= settings.lost_force)[leg.ref.holds[k]].all())
-            and not (slips and settings.slip_trigger and self.slip > share * self._slip_limit)
+            and not (slips and settings.slip_trigger and self.slip > share * settings.slip_distance)
         )
 
     def _lost(self, k: int, senses: Senses) -> Trigger | None:
@@ -126,7 +125,7 @@ class Monitor:
         self._baseline = np.where(holds[:, None], np.where(np.isnan(self._baseline), off, self._baseline), np.nan)
         moved = np.linalg.norm(np.where(holds[:, None], off - self._baseline, 0.0), axis=1)
         self.slip = float(np.nanmax(moved, initial=0.0))
-        if self._settings.slip_trigger and self.slip > self._slip_limit:
+        if self._settings.slip_trigger and self.slip > self._settings.slip_distance:
             finger = leg.rig.fingers[int(np.nanargmax(moved))].name
             return Trigger("slip", f'finger "{finger}" has slipped by {1e3 * self.slip:.1f} mm')
         return None

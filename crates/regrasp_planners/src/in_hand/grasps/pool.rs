@@ -7,6 +7,7 @@ use regrasp_geometry::Pose;
 use regrasp_geometry::collision::Placement;
 use regrasp_grasp::Contact;
 use regrasp_manipulation::grasp::contact::draw_footholds;
+use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 
 /// Most footholds kept per finger.
@@ -94,6 +95,18 @@ impl Pool {
         search.rng.shuffle(&mut order);
         order.truncate(n_wanted);
         order.into_iter().map(|which| footholds[which].candidate(footholds[which].rank())).collect()
+    }
+
+    /// For every finger what it does in `state`, which is at the pool's pose, then up to `n_wanted` candidates, any.
+    ///
+    /// The search's workspace is left anywhere.
+    pub fn around(&mut self, search: &mut Search, state: &GraspState, n_wanted: usize) -> Vec<Vec<Candidate>> {
+        let of_finger = |finger| {
+            let mut of_finger = vec![Candidate::present(state, finger)];
+            of_finger.extend(self.any(search, finger, n_wanted));
+            of_finger
+        };
+        (0..state.joints.len()).map(of_finger).collect()
     }
 
     /// Up to `n_wanted` candidates of `finger` for the way to the aim: those that follow farthest, and one of the others

@@ -1,7 +1,7 @@
 //! The grasp that a plan ends with. The next plan begins with it: where it holds little, that plan holds as little.
 
 use crate::in_hand::attempt::search::Search;
-use crate::in_hand::grasps::candidate::{Candidate, Choice};
+use crate::in_hand::grasps::candidate::Choice;
 use crate::in_hand::grasps::closure_table::ClosureTable;
 use crate::in_hand::grasps::pool::Pool;
 use crate::in_hand::regrasping::regrasp::{ChangeGoal, regrasp_over};
@@ -17,7 +17,7 @@ const CONTACTS: usize = 10;
 const RELOCATIONS: usize = 12;
 
 /// The fewest relocations after `end` that lead to a grasp of all fingers with the closure margin `wanted`; None where `end` holds so
-/// much, and where no such relocations are found.
+/// much, and where no such relocations are found. It ends by itself, after few tries: the search's limits are not looked at.
 pub fn better_end(search: &mut Search, end: &GraspState, wanted: f64) -> Option<Sequence> {
     let model = search.model();
     let holds = |contacts: &[Contact], holding: u32| model.closure_margin_up_to(contacts, holding, wanted) >= wanted;
@@ -25,13 +25,7 @@ pub fn better_end(search: &mut Search, end: &GraspState, wanted: f64) -> Option<
         return None;
     }
     let pose = end.world_from_object;
-    let mut pool = Pool::new(&pose, &pose, model.n_fingers());
-    let mut options = Vec::with_capacity(model.n_fingers());
-    for finger in 0..model.n_fingers() {
-        let mut of_finger = vec![Candidate::present(end, finger)];
-        of_finger.extend(pool.any(search, finger, CONTACTS));
-        options.push(of_finger);
-    }
+    let options = Pool::new(&pose, &pose, model.n_fingers()).around(search, end, CONTACTS);
     let mut table = ClosureTable::new(model, &options);
     let mut rng = Rng::child(&search.rng, "ending", 0);
     search.rng.bits();

@@ -2,7 +2,7 @@
 //! a box), trees that take what follows farthest never meet a grasp in which it may leave. Such grasps are sought here.
 
 use crate::in_hand::attempt::search::Search;
-use crate::in_hand::grasps::candidate::{Candidate, Choice};
+use crate::in_hand::grasps::candidate::Choice;
 use crate::in_hand::grasps::closure_table::ClosureTable;
 use crate::in_hand::grasps::pool::Pool;
 use crate::in_hand::regrasping::regrasp::{ChangeGoal, regrasp_over};
@@ -45,12 +45,7 @@ pub fn draw_bound_finger(search: &mut Search) -> Option<usize> {
 /// The fewest relocations from `state` that end with one of `finger`, over contacts of the `pool` at the same pose.
 pub fn unlock(search: &mut Search, state: &GraspState, finger: usize, pool: &mut Pool) -> Option<Sequence> {
     let model = search.model();
-    let mut options = Vec::with_capacity(model.n_fingers());
-    for f in 0..model.n_fingers() {
-        let mut of_finger = vec![Candidate::present(state, f)];
-        of_finger.extend(pool.any(search, f, CONTACTS));
-        options.push(of_finger);
-    }
+    let options = pool.around(search, state, CONTACTS);
     let mut table = ClosureTable::new(model, &options);
     let mut rng = Rng::child(&search.rng, "unlock", 0);
     search.rng.bits();
