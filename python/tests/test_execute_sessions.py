@@ -53,7 +53,7 @@ def test_hands_with_mesh_tips_get_an_eighth_of_the_work_for_more_plans() -> None
         assert isinstance(plan, regrasp.Plan)
         session: Any = Counted(own, plan, 10_000)
         settings = ExecutorSettings(choices=1000, choice_work=400_000)
-        planning = ChargedPlanning([session], settings, lambda _: None)
+        planning = ChargedPlanning([session], settings, lambda _, __: None)
         start: Any = None
         ticket = planning.ask(start, regrasp.Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])), 0, 7.0)
         # As many plans as fit in the work, and time that is charged at the hand's rate.

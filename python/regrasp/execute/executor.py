@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from .._result import Failure
 from .._session import Session, Start
 from ..simulate.model import Rig, Settings
 from ..simulate.reference import Array
+from .goals import between
 from .leg import Leg, first_rig
 from .log import Event, GoalResult, LegRecord, RunLog, Sample
 from .monitor import HOLDING, Monitor, Trigger, pose_error, why_gone
@@ -145,7 +146,7 @@ class Executor:
         settings = self._settings
         started, motion_time, n_legs, why_not = self._senses.time, 0.0, 0, ""
         quat = np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
-        is_reached = False
+        is_reached = has_missed = False
         ahead: Ticket | None = None
         # A leg to another goal does not go on.
         self._stopped = None
@@ -154,7 +155,7 @@ class Executor:
             prepared = None
             if ticket is None:
                 try:
-                    ticket = self._query(goal)
+                    ticket = self._query(goal, is_again=attempt > 0, has_missed=has_missed)
                 except _GoOn as cause:
                     self._event("no_start", str(cause), "resume")
             if ticket is not None:
@@ -189,6 +190,7 @@ class Executor:
             if is_reached or not settings.replanning:
                 break
             ahead = None
+            has_missed = True
             self._event("missed", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
         self._result(goal, quat, is_reached, started, n_legs, motion_time, before, why_not)
         return ahead, quat
@@ -230,18 +232,21 @@ class Executor:
 
     # --------------------------------------------------------------------------------------------------------------- queries
 
-    def _query(self, goal: Pose) -> Ticket:
-        """Asks for a plan from where the object really is; without replanning, from where the plan before has it."""
-        if not self._settings.replanning and self._leg is not None:
-            start = self._predicted(self._leg.plan)
-        else:
-            start = self._observed_start()
-        return self._ask(start, goal)
+    def _query(self, goal: Pose, *, is_again: bool = False, has_missed: bool = False) -> Ticket:
+        """Asks for a plan from where the object really is; without replanning, from where the plan before has it. is_again: a leg to
+        this goal went wrong. has_missed: one came to its end, but not to the goal."""
+        settings = self._settings
+        if not settings.replanning and self._leg is not None:
+            return self._ask(self._predicted(self._leg.plan), goal)
+        start = self._observed_start()
+        if has_missed:
+            goal = between(start.world_from_object, goal, settings.again_share)
+        return self._ask(start, goal, settings.again_speed if is_again else 1.0)
 
-    def _ask(self, start: Start, goal: Pose) -> Ticket:
+    def _ask(self, start: Start, goal: Pose, speed: float = 1.0) -> Ticket:
         self._n_queries += 1
         seed = self._settings.seed + 1000 * self._n_queries
-        return self._planning.ask(start, goal, seed, self._senses.time, self._firm if self._grips_firmer else ())
+        return self._planning.ask(start, goal, seed, self._senses.time, self._firm if self._grips_firmer else (), speed)
 
     def _ask_ahead(self, plan: Plan, following: Pose) -> Ticket | None:
         start = self._session.project(Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1]), plan.joints[-1])
@@ -260,21 +265,13 @@ class Executor:
         """
         settings = self._settings
         since = self._senses.time
-        told = False
+        told, reach = False, 1.0
         while True:
-            message = ""
             self._hold_for(settings.rest_time)
             senses = self._senses
-            pose = Pose(senses.position.copy(), senses.quat[[1, 2, 3, 0]].copy())
-            presses = None if senses.forces is None else (senses.forces > settings.lost_force).tolist()
-            for session in self._for_starts:
-                start = session.project(
-                    pose, senses.joints, presses=presses, distance=settings.project_distance, turn=settings.project_turn
-                )
-                if isinstance(start, Start):
-                    return start
-                # The last session accepts most: its cause is what is left.
-                message = start.message
+            start, message = self._start_near(reach)
+            if start is not None:
+                return start
             gone = why_gone(self._leg, self._senses, self._settings)
             if gone:
                 raise _GiveUp("lost", f"{gone}; no start: {message}")
@@ -283,11 +280,29 @@ class Executor:
                 told = True
             if self._may_go_on():
                 raise _GoOn(message)
-            if self._go_back():
+            if self._go_back() or senses.time - since <= settings.patience:
                 continue
-            if senses.time - since > settings.patience:
-                lost = "no finger touches" in message if presses is None else sum(presses) < HOLDING
+            if reach >= settings.last_reach:
+                n_felt = None if senses.forces is None else int((senses.forces > settings.lost_force).sum())
+                lost = "no finger touches" in message if n_felt is None else n_felt < HOLDING
                 raise _GiveUp("lost" if lost else "gave_up", f"no start: {message}")
+            # Before the hand gives up, a start farther off is good enough: the fingers go there from where they are.
+            reach = settings.last_reach
+
+    def _start_near(self, reach: float) -> tuple[Start | None, str]:
+        """The start nearest to what is seen, within so many times the usual limits, or why there is none."""
+        settings, senses = self._settings, self._senses
+        pose = Pose(senses.position.copy(), senses.quat[[1, 2, 3, 0]].copy())
+        presses = None if senses.forces is None else (senses.forces > settings.lost_force).tolist()
+        distance, turn = reach * settings.project_distance, reach * settings.project_turn
+        message = ""
+        for session in self._for_starts:
+            start = session.project(pose, senses.joints, presses=presses, distance=distance, turn=turn)
+            if isinstance(start, Start):
+                return start, ""
+            # The last session accepts most: its cause is what is left.
+            message = start.message
+        return None, message
 
     def _may_go_on(self) -> bool:
         """True where a leg was stopped on its way, once, and all but slipped fingertips are where that leg has them."""
@@ -313,10 +328,12 @@ class Executor:
                 self._outlast(faults)
         return self._k < last
 
-    def _prepare(self, plan: Plan) -> Leg:
+    def _prepare(self, plan: Plan, speed: float) -> Leg:
         if self._rig is None:
             self._rig = first_rig(plan, self._control, *self._gains)
-        return Leg(plan, self._rig, self._control)
+        # Fingertips that hold for long creep over the object: where fingers relocate, the motion is as fast as ever.
+        share = speed if plan.statistics["relocations"] == 0 else 1.0
+        return Leg(plan, self._rig, replace(self._control, speed=share * self._control.speed))
 
     def _wait_for(self, ticket: Ticket) -> None:
         """Holds until the answer is there."""

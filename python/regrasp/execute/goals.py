@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .._model import Pose
-from ..simulate.reference import Array, quat_exp, quat_product
+from ..simulate.reference import Array, quat_exp, quat_inverse, quat_product, rotation_vector
 
 
 def turns(start: Pose, *, count: int, seed: int = 0, largest: float = float(np.pi / 2), axis: Array | None = None) -> Iterator[Pose]:
@@ -24,3 +24,10 @@ def turns(start: Pose, *, count: int, seed: int = 0, largest: float = float(np.p
         quat = quat / np.linalg.norm(quat)
         w = -quat if quat[0] < 0.0 else quat
         yield Pose(np.array(start.position), w[[1, 2, 3, 0]].copy())
+
+
+def between(start: Pose, goal: Pose, share: float) -> Pose:
+    """The pose that is this share of the way from ``start`` to ``goal``."""
+    first, last = (np.array(pose.quat_xyzw)[[3, 0, 1, 2]] for pose in (start, goal))
+    turned = quat_product(quat_exp(share * rotation_vector(quat_product(last, quat_inverse(first)))), first)
+    return Pose((1.0 - share) * np.array(start.position) + share * np.array(goal.position), turned[[1, 2, 3, 0]])

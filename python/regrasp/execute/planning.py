@@ -26,6 +26,8 @@ class Ticket:
     goal: Pose
     asked_at: float
     """Time of the plant."""
+    speed: float = 1.0
+    """Of the motion, as a share of the plan's own."""
     ready_at: float | None = None
     answer: Plan | Failure | None = None
     error: BaseException | None = None
@@ -40,7 +42,8 @@ class Ticket:
     done: threading.Event = field(default_factory=threading.Event)
 
 
-Prepare = Callable[[Plan], Any]
+Prepare = Callable[[Plan, float], Any]
+"""Of a plan and the speed of its motion, as a share of the plan's own."""
 
 
 Sessions = Sequence[Session]
@@ -50,8 +53,8 @@ Sessions = Sequence[Session]
 class Planning(Protocol):
     """Answers queries while the hand does something else."""
 
-    def ask(self, start: Start, goal: Pose, seed: int, now: float, first: Sessions = ()) -> Ticket:
-        """Asks. Does not wait. first: sessions that are asked before the usual ones."""
+    def ask(self, start: Start, goal: Pose, seed: int, now: float, first: Sessions = (), speed: float = 1.0) -> Ticket:
+        """Asks. Does not wait. first: sessions that are asked before the usual ones. speed: of the motion."""
         ...
 
     def is_ready(self, ticket: Ticket, now: float) -> bool:
@@ -93,7 +96,7 @@ def _solve(sessions: Sessions, settings: ExecutorSettings, prepare: Prepare, tic
         if isinstance(answer, Plan):
             most_work = work_share(session.hand) * settings.choice_work
             answer = _shortest(answer, lambda number: ask(session, len(tries) + number), ticket, (settings.choices, most_work))
-            ticket.prepared = prepare(answer)
+            ticket.prepared = prepare(answer, ticket.speed)
             break
     ticket.answer = answer
 
@@ -122,8 +125,8 @@ class ChargedPlanning:
         self._settings = settings
         self._prepare = prepare
 
-    def ask(self, start: Start, goal: Pose, seed: int, now: float, first: Sessions = ()) -> Ticket:
-        ticket = Ticket(start, goal, now)
+    def ask(self, start: Start, goal: Pose, seed: int, now: float, first: Sessions = (), speed: float = 1.0) -> Ticket:
+        ticket = Ticket(start, goal, now, speed)
         _solve([*first, *self._sessions], self._settings, self._prepare, ticket, seed)
         rate = work_share(self._sessions[0].hand) * self._settings.work_rate
         ticket.ready_at = now + ticket.work / rate + self._settings.planning_overhead
@@ -145,8 +148,8 @@ class ThreadPlanning:
         self._prepare = prepare
         self._running: list[tuple[Ticket, threading.Thread]] = []
 
-    def ask(self, start: Start, goal: Pose, seed: int, now: float, first: Sessions = ()) -> Ticket:
-        ticket = Ticket(start, goal, now)
+    def ask(self, start: Start, goal: Pose, seed: int, now: float, first: Sessions = (), speed: float = 1.0) -> Ticket:
+        ticket = Ticket(start, goal, now, speed)
 
         def work() -> None:
             try:

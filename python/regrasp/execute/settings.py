@@ -131,8 +131,20 @@ class ExecutorSettings:
     """How far a start may be from what was observed,"""
     project_turn: float = 0.04
     """and by which angle, of the object and of any joint."""
+    last_reach: float = 2.0
+    """Where no such start is found for ``patience``, it may be this many times as far, before the hand gives up."""
     attempts: int = 4
     """Legs that are tried for one goal."""
+    again_speed: float = 1.0
+    """All but the first run at this share of their plan's speed, where no finger relocates."""
+    again_share: float = 1.0
+    """Where a leg came to its end but not to the goal, the next one goes this share of what is left."""
+    again_speed_round: float = 0.3
+    """The same for spheres and ellipsoids, where that is less. By measurement: a sphere that fingertips turn by a few degrees within 0.1 s
+    goes on turning, twice as far in a grasp that was looked into."""
+    again_share_round: float = 0.5
+    """The same for spheres and ellipsoids, where that is less. Else, where the object turns twice as far as planned, all legs to a goal
+    end as far off as the first, on one side and the other. Cubes turn as they are told."""
     plan_attempts: int = 3
     """Seeds that are tried for one leg."""
     choices: int = 20
@@ -153,4 +165,11 @@ class ExecutorSettings:
 
     def for_object(self, moved: Object) -> ExecutorSettings:
         """The same with what holds for this object."""
-        return replace(self, slip_distance=min(self.slip_distance, self.slip_round)) if moved.shape.kind in ROUND else self
+        if moved.shape.kind not in ROUND:
+            return self
+        return replace(
+            self,
+            slip_distance=min(self.slip_distance, self.slip_round),
+            again_speed=min(self.again_speed, self.again_speed_round),
+            again_share=min(self.again_share, self.again_share_round),
+        )

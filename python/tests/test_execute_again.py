@@ -1,0 +1,105 @@
+"""What the executor does where a leg went wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import regrasp
+
+pytest.importorskip("mujoco")
+
+from regrasp.execute import Executor, ExecutorSettings, MujocoPlant, PlantSettings, turns  # noqa: E402
+from regrasp.execute.goals import between  # noqa: E402
+from regrasp.execute.planning import ChargedPlanning, Ticket  # noqa: E402
+from regrasp.execute.settings import PLANNER  # noqa: E402
+
+SCENES = Path(__file__).parents[2] / "scenes"
+
+
+def angle_between(a: Any, b: Any) -> float:
+    return 2.0 * float(np.arccos(min(1.0, abs(float(np.dot(a, b))))))
+
+
+def test_between_goes_its_share_of_the_way() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        quats = rng.normal(size=(2, 4))
+        quats /= np.linalg.norm(quats, axis=1)[:, None]
+        start, goal = (regrasp.Pose(rng.normal(size=3), quat) for quat in quats)
+        whole = angle_between(start.quat_xyzw, goal.quat_xyzw)
+        for share in (0.0, 0.3, 1.0):
+            found = between(start, goal, share)
+            assert np.linalg.norm(found.quat_xyzw) == pytest.approx(1.0)
+            assert angle_between(start.quat_xyzw, found.quat_xyzw) == pytest.approx(share * whole, abs=1e-6)
+            assert angle_between(found.quat_xyzw, goal.quat_xyzw) == pytest.approx((1.0 - share) * whole, abs=1e-6)
+            assert np.allclose(found.position, start.position + share * (goal.position - start.position))
+
+
+class Told(ChargedPlanning):
+    """Remembers what it was asked."""
+
+    tickets: list[Ticket] = []
+
+    def ask(self, *args: Any, **more: Any) -> Ticket:
+        ticket = super().ask(*args, **more)
+        Told.tickets.append(ticket)
+        return ticket
+
+
+@pytest.mark.parametrize(("name", "share", "speed"), [("sphere_90x", 0.5, 0.3), ("box_90x", 1.0, 1.0)])
+def test_legs_after_a_miss_aim_nearer_and_run_slower_on_round_objects(name: str, share: float, speed: float) -> None:
+    scene = regrasp.load_scene(SCENES / f"{name}.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    goal = next(turns(plant.pose, count=1, seed=3, largest=0.3))
+    Told.tickets = []
+    # No leg ever comes so near.
+    settings = ExecutorSettings(attempts=3, reached_turn=1e-9)
+    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, settings, planning=Told)
+    log = executor.run([goal])
+    assert [event.kind for event in log.events if event.kind == "missed"] == ["missed"] * 3
+    assert len(Told.tickets) == len(log.plans) == 3
+    for attempt, (ticket, leg, plan) in enumerate(zip(Told.tickets, log.legs, log.plans)):
+        asked, left = (angle_between(ticket.start.world_from_object.quat_xyzw, pose.quat_xyzw) for pose in (ticket.goal, goal))
+        assert asked == pytest.approx((share if attempt else 1.0) * left, abs=1e-6)
+        is_slow = attempt > 0 and plan.statistics["relocations"] == 0
+        assert leg.duration == pytest.approx(plan.duration / (speed if is_slow else 1.0), abs=3 * plant.tick)
+    assert any(plan.statistics["relocations"] == 0 for plan in log.plans[1:]), "no leg shows the speed"
+
+
+class Strict:
+    """A session that has no start within less than this."""
+
+    def __init__(self, session: regrasp.Session, least: float) -> None:
+        self._session, self._least = session, least
+        self.asked: list[tuple[float, float]] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._session, name)
+
+    def project(self, *args: Any, distance: float = 0.001, turn: float = 0.02, **more: Any) -> Any:
+        self.asked.append((distance, turn))
+        answer = self._session.project(*args, distance=distance, turn=turn, **more)
+        if distance >= self._least:
+            return answer
+        elsewhere = regrasp.Pose(np.array([0.0, 0.0, 9.0]), np.array([0.0, 0.0, 0.0, 1.0]))
+        return self._session.project(elsewhere, *args[1:], distance=distance, turn=turn, **more)
+
+
+@pytest.mark.parametrize(("least", "status"), [(0.0035, "done"), (0.0045, "gave_up")])
+def test_a_start_farther_off_is_good_enough_before_the_hand_gives_up(least: float, status: str) -> None:
+    scene = regrasp.load_scene(SCENES / "sphere_90x.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    strict: Any = Strict(regrasp.Session(scene, settings=PLANNER), least)
+    settings = ExecutorSettings(anytime=False)
+    log = Executor(strict, plant, settings).run(turns(plant.pose, count=1, seed=3))
+    assert log.status == status, log.message
+    usual, wide = (settings.project_distance, settings.project_turn), (0.004, 0.08)
+    assert set(strict.asked) == {usual, wide} and strict.asked == sorted(strict.asked), strict.asked
+    # The usual limits are asked again and again, for as long as the hand is patient.
+    events = [event for event in log.events if event.kind == "no_start"]
+    assert len(events) == 1 and len(strict.asked) > 3
+    assert plant.touching() >= 2
