@@ -13,9 +13,11 @@ import regrasp
 pytest.importorskip("mujoco")
 
 from regrasp.execute import Executor, ExecutorSettings, MujocoPlant, PlantSettings, turns  # noqa: E402
+from regrasp.execute.estimate import PoseFilter  # noqa: E402
 from regrasp.execute.goals import between  # noqa: E402
 from regrasp.execute.planning import ChargedPlanning, Ticket  # noqa: E402
 from regrasp.execute.settings import PLANNER  # noqa: E402
+from regrasp.simulate.reference import quat_exp, quat_product  # noqa: E402
 
 SCENES = Path(__file__).parents[2] / "scenes"
 
@@ -37,6 +39,22 @@ def test_between_goes_its_share_of_the_way() -> None:
             assert angle_between(start.quat_xyzw, found.quat_xyzw) == pytest.approx(share * whole, abs=1e-6)
             assert angle_between(found.quat_xyzw, goal.quat_xyzw) == pytest.approx((1.0 - share) * whole, abs=1e-6)
             assert np.allclose(found.position, start.position + share * (goal.position - start.position))
+
+
+def test_a_late_image_moves_all_poses_since() -> None:
+    rng = np.random.default_rng(5)
+    pose_filter = PoseFilter(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.0, 0.2)
+    poses: list[tuple[float, Any, Any]] = []
+    for tick in range(300):
+        pose_filter.predict(0.004 * tick, *(1e-3 * rng.normal(size=(2, 3))))
+        poses.append((0.004 * tick, pose_filter.position, pose_filter.quat))
+    shift, turn = 1e-2 * rng.normal(size=(2, 3))
+    pose_filter.restart(shift, turn, 1.0)
+    for time, position, quat in poses[60::24]:
+        moved = quat_product(quat_exp(turn), quat)
+        off, angle = pose_filter.innovation(position + shift, moved, time)
+        assert np.abs(off).max() < 1e-15 and np.abs(angle).max() < 1e-14
+        assert np.linalg.norm(pose_filter.innovation(position, quat, time)[0]) == pytest.approx(np.linalg.norm(shift))
 
 
 class Told(ChargedPlanning):
