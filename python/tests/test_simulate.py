@@ -331,3 +331,17 @@ def test_a_campaign_replays_plans_that_are_there(tmp_path: Path, capsys: pytest.
     with pytest.raises(SystemExit):
         campaign([scene, "--made", str(tmp_path / "nothing"), "--gravity", "plan", "-o", str(tmp_path / "out")])
     assert "has no folder of plans" in capsys.readouterr().err
+
+
+def test_one_quaternion_is_computed_as_many_are() -> None:
+    from regrasp.simulate.reference import quat_product, rotation_matrices
+
+    quats = np.random.default_rng(2).normal(size=(2, 50, 4))
+    products, matrices = quat_product(*quats), rotation_matrices(quats[0])
+    for a, b, product, matrix in zip(*quats, products, matrices):
+        assert (quat_product(a, b) == product).all() and (rotation_matrices(a) == matrix).all()
+        # A product turns as its factors do, one after the other.
+        ab = rotation_matrices(product / np.linalg.norm(product))
+        one_by_one = rotation_matrices(a / np.linalg.norm(a)) @ rotation_matrices(b / np.linalg.norm(b))
+        assert np.allclose(ab, one_by_one, atol=1e-12)
+    assert (quat_product(quats[0][0], quats[1]) == quat_product(np.tile(quats[0][0], (50, 1)), quats[1])).all()

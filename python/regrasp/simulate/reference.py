@@ -155,16 +155,15 @@ def _object_poses(points: list[dict[str, Any]], index: NDArray[np.int64], s: Arr
 
 def quat_product(a: Array, b: Array) -> Array:
     """Product of quaternions w x y z, over the last axis."""
-    aw, ax, ay, az = np.moveaxis(a, -1, 0)
-    bw, bx, by, bz = np.moveaxis(b, -1, 0)
-    return np.stack(
+    aw, ax, ay, az = _parts(a)
+    bw, bx, by, bz = _parts(b)
+    return _joined(
         (
             aw * bw - ax * bx - ay * by - az * bz,
             aw * bx + ax * bw + ay * bz - az * by,
             aw * by - ax * bz + ay * bw + az * bx,
             aw * bz + ax * by - ay * bx + az * bw,
-        ),
-        axis=-1,
+        )
     )
 
 
@@ -190,10 +189,21 @@ def rotation_vector(quat: Array) -> Array:
 
 def rotation_matrices(quat: Array) -> Array:
     """Rotation matrices of unit quaternions w x y z; shape (..., 3, 3)."""
-    w, x, y, z = np.moveaxis(quat, -1, 0)
+    w, x, y, z = _parts(quat)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
         (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
+    if quat.ndim == 1:
+        return np.array(rows)
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _parts(quat: Array) -> Any:
+    """What is along the last axis; plain numbers of one quaternion, with which numpy is slow."""
+    return quat.tolist() if quat.ndim == 1 else np.moveaxis(quat, -1, 0)
+
+
+def _joined(parts: tuple[Any, ...]) -> Array:
+    return np.array(parts) if all(isinstance(part, float) for part in parts) else np.stack(parts, axis=-1)
