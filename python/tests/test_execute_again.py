@@ -16,7 +16,7 @@ from regrasp.execute import Executor, ExecutorSettings, MujocoPlant, PlantSettin
 from regrasp.execute.estimate import PoseFilter  # noqa: E402
 from regrasp.execute.goals import between  # noqa: E402
 from regrasp.execute.planning import ChargedPlanning, Ticket  # noqa: E402
-from regrasp.execute.settings import PLANNER  # noqa: E402
+from regrasp.execute.settings import PLANNER, careful_settings  # noqa: E402
 from regrasp.simulate.reference import quat_exp, quat_product  # noqa: E402
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -69,14 +69,15 @@ class Told(ChargedPlanning):
 
 
 @pytest.mark.parametrize(("name", "share", "speed"), [("sphere_90x", 0.5, 0.3), ("box_90x", 1.0, 1.0)])
-def test_legs_after_a_miss_aim_nearer_and_run_slower_on_round_objects(name: str, share: float, speed: float) -> None:
+def test_legs_after_a_miss_aim_nearer_run_slower_and_press_less_on_round_objects(name: str, share: float, speed: float) -> None:
     scene = regrasp.load_scene(SCENES / f"{name}.toml")
     plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
     goal = next(turns(plant.pose, count=1, seed=3, largest=0.3))
     Told.tickets = []
     # No leg ever comes so near.
     settings = ExecutorSettings(attempts=3, reached_turn=1e-9)
-    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, settings, planning=Told)
+    careful = regrasp.Session(scene, settings=careful_settings(scene.objects[0]))
+    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, settings, planning=Told, careful=[careful])
     log = executor.run([goal])
     assert [event.kind for event in log.events if event.kind == "missed"] == ["missed"] * 3
     assert len(Told.tickets) == len(log.plans) == 3
@@ -84,6 +85,8 @@ def test_legs_after_a_miss_aim_nearer_and_run_slower_on_round_objects(name: str,
         asked, left = (angle_between(ticket.start.world_from_object.quat_xyzw, pose.quat_xyzw) for pose in (ticket.goal, goal))
         assert asked == pytest.approx((share if attempt else 1.0) * left, abs=1e-6)
         is_slow = attempt > 0 and plan.statistics["relocations"] == 0
+        is_careful = attempt == 0 or speed == 1.0
+        assert plan.promises["friction_margin"] == (2.0 if is_careful else 1.5)
         assert leg.duration == pytest.approx(plan.duration / (speed if is_slow else 1.0), abs=3 * plant.tick)
     assert any(plan.statistics["relocations"] == 0 for plan in log.plans[1:]), "no leg shows the speed"
 

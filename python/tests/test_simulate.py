@@ -334,8 +334,6 @@ def test_a_campaign_replays_plans_that_are_there(tmp_path: Path, capsys: pytest.
 
 
 def test_one_quaternion_is_computed_as_many_are() -> None:
-    from regrasp.simulate.reference import quat_product, rotation_matrices
-
     quats = np.random.default_rng(2).normal(size=(2, 50, 4))
     products, matrices = quat_product(*quats), rotation_matrices(quats[0])
     for a, b, product, matrix in zip(*quats, products, matrices):

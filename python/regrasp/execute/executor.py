@@ -22,7 +22,7 @@ from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
 from .plant import Command, Plant
 from .senses import Fault, Senses
 from .sessions import ExecutorSessions
-from .settings import ExecutorSettings
+from .settings import ROUND, ExecutorSettings
 
 #: A sample is kept every so many ticks.
 SAMPLED = 5
@@ -86,6 +86,7 @@ class Executor:
         maker = planning or (ChargedPlanning if self._truth is not None else ThreadPlanning)
         self._planning = maker([*careful, session, *loose], self._settings, self._prepare)
         self._for_starts = [session, *loose]
+        self._is_round = session.object.shape.kind in ROUND
         self._firm = firm
         self._grips_firmer = self._settings.grip == "firm"
         self._rig: Rig | None = None
@@ -239,14 +240,17 @@ class Executor:
         if not settings.replanning and self._leg is not None:
             return self._ask(self._predicted(self._leg.plan), goal)
         start = self._observed_start()
+        first: Sequence[Session] = ()
         if has_missed:
             goal = between(start.world_from_object, goal, settings.again_share)
-        return self._ask(start, goal, settings.again_speed if is_again else 1.0)
+            # The firmer grip that careful plans have on round objects is what makes them turn too far.
+            first = [self._session] if self._is_round else ()
+        return self._ask(start, goal, first, settings.again_speed if is_again else 1.0)
 
-    def _ask(self, start: Start, goal: Pose, speed: float = 1.0) -> Ticket:
+    def _ask(self, start: Start, goal: Pose, first: Sequence[Session] = (), speed: float = 1.0) -> Ticket:
         self._n_queries += 1
         seed = self._settings.seed + 1000 * self._n_queries
-        return self._planning.ask(start, goal, seed, self._senses.time, self._firm if self._grips_firmer else (), speed)
+        return self._planning.ask(start, goal, seed, self._senses.time, self._firm if self._grips_firmer else first, speed)
 
     def _ask_ahead(self, plan: Plan, following: Pose) -> Ticket | None:
         start = self._session.project(Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1]), plan.joints[-1])

@@ -140,11 +140,11 @@ class ExecutorSettings:
     again_share: float = 1.0
     """Where a leg came to its end but not to the goal, the next one goes this share of what is left."""
     again_speed_round: float = 0.3
-    """The same for spheres and ellipsoids, where that is less. By measurement: a sphere that fingertips turn by a few degrees within 0.1 s
-    goes on turning, twice as far in a grasp that was looked into."""
+    """The same for spheres and ellipsoids, where that is less."""
     again_share_round: float = 0.5
-    """The same for spheres and ellipsoids, where that is less. Else, where the object turns twice as far as planned, all legs to a goal
-    end as far off as the first, on one side and the other. Cubes turn as they are told."""
+    """The same for spheres and ellipsoids, where that is less. By measurement: fingertips that press on a sphere hold it as well a few degrees to
+    one side of where it should be as to the other, and it goes from one side to the other. Of that, these two and plans with the usual
+    grip first, which legs after a miss have, help together (docs/benchmarks/execute.md). Not measured on other shapes, but for the speed."""
     plan_attempts: int = 3
     """Seeds that are tried for one leg."""
     choices: int = 20
