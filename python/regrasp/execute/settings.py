@@ -142,9 +142,9 @@ class ExecutorSettings:
     again_speed_round: float = 0.3
     """The same for spheres and ellipsoids, where that is less."""
     again_share_round: float = 0.5
-    """The same for spheres and ellipsoids, where that is less. By measurement: fingertips that press on a sphere hold it as well a few degrees to
-    one side of where it should be as to the other, and it goes from one side to the other. Of that, these two and plans with the usual
-    grip first, which legs after a miss have, help together (docs/benchmarks/execute.md). Not measured on other shapes, but for the speed."""
+    """The same for spheres and ellipsoids, where that is less. By measurement: a sphere came to rest a few degrees beyond its goal, and every
+    new leg pushed it as far beyond on the other side. Against that these two help, together with the usual grip, which legs after a miss
+    have (docs/benchmarks/execute.md). On other shapes the share was not measured, and slow legs did harm where fingers relocate."""
     plan_attempts: int = 3
     """Seeds that are tried for one leg."""
     choices: int = 20
