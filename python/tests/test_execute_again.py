@@ -76,8 +76,8 @@ def test_legs_after_a_miss_aim_nearer_run_slower_and_press_less_on_round_objects
     Told.tickets = []
     # No leg ever comes so near.
     settings = ExecutorSettings(attempts=3, reached_turn=1e-9)
-    careful = regrasp.Session(scene, settings=careful_settings(scene.objects[0]))
-    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, settings, planning=Told, careful=[careful])
+    careful = [regrasp.Session(scene, settings=kind) for kind in careful_settings(scene.objects[0])]
+    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, settings, planning=Told, careful=careful)
     log = executor.run([goal])
     assert [event.kind for event in log.events if event.kind == "missed"] == ["missed"] * 3
     assert len(Told.tickets) == len(log.plans) == 3

@@ -14,7 +14,7 @@ import pytest
 import regrasp
 from regrasp.execute.planning import ChargedPlanning
 from regrasp.execute.sessions import ExecutorSessions, planner_settings
-from regrasp.execute.settings import CAREFUL, CAREFUL_ROUND, MESH_TIPS, PLANNER, ExecutorSettings, work_share
+from regrasp.execute.settings import CAREFUL, CAREFUL_ROUND, CLEAR_ROUND, MESH_TIPS, PLANNER, ExecutorSettings, work_share
 
 ROOT = Path(__file__).parents[2]
 MODELS = Path(os.environ.get("REGRASP_MODELS", ROOT.parent / "shared/models"))
@@ -62,13 +62,14 @@ def test_hands_with_mesh_tips_get_an_eighth_of_the_work_for_more_plans() -> None
         assert ticket.ready_at == pytest.approx(7.0 + charged)
 
 
-@pytest.mark.parametrize(("name", "careful"), [("box_90x", CAREFUL), ("sphere_90x", CAREFUL_ROUND)])
-def test_sessions_of_a_scene_have_the_settings_of_execution(name: str, careful: dict[str, Any]) -> None:
+@pytest.mark.parametrize(("name", "careful"), [("box_90x", (CAREFUL,)), ("sphere_90x", (CLEAR_ROUND, CAREFUL_ROUND))])
+def test_sessions_of_a_scene_have_the_settings_of_execution(name: str, careful: tuple[dict[str, Any], ...]) -> None:
     scene = regrasp.load_scene(ROOT / f"scenes/{name}.toml")
     sessions = ExecutorSessions.of(scene)
     plan = regrasp.plan(scene, seed=1)
     assert isinstance(plan, regrasp.Plan)
-    for session, least in ((sessions.usual, PLANNER), (sessions.careful, careful)):
+    assert len(sessions.careful) == len(careful)
+    for session, least in zip((sessions.usual, *sessions.careful), (PLANNER, *careful)):
         start = session.project(regrasp.Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1]), plan.joints[-1])
         assert start
         back = regrasp.Pose(plan.object_positions[0], plan.object_quat_xyzw[0])
@@ -76,6 +77,7 @@ def test_sessions_of_a_scene_have_the_settings_of_execution(name: str, careful: 
         assert isinstance(found, regrasp.Plan), found
         assert found.settings["improve_work"] == least["improve_work"]
         assert found.settings["friction_margin"] == least.get("friction_margin", 1.5)
+        assert found.settings["clearance"] == least.get("clearance", 0.0002)
         assert found.settings["end_margin"] == least.get("end_margin", 0.0)
         assert found.settings["forces"]["squeeze"] == least.get("forces", {"squeeze": 4.0})["squeeze"]
 

@@ -107,7 +107,7 @@ class Executor:
     @classmethod
     def of(cls, sessions: ExecutorSessions, plant: Plant, settings: ExecutorSettings | None = None, **more: Any) -> Executor:
         """With all sessions of a scene. more: as of `Executor`."""
-        all_of_it: dict[str, Any] = {"careful": [sessions.careful], "loose": [sessions.loose], "firm": [sessions.firm], **more}
+        all_of_it: dict[str, Any] = {"careful": sessions.careful, "loose": [sessions.loose], "firm": [sessions.firm], **more}
         return cls(sessions.usual, plant, settings, **all_of_it)
 
     # ------------------------------------------------------------------------------------------------------------- whole runs

@@ -16,8 +16,8 @@ class ExecutorSessions:
     """What `Executor` asks for plans, in the order of ``firm`` where the grip is firm, ``careful``, ``usual``, ``loose``."""
 
     usual: Session
-    careful: Session
-    """More room for friction that is lower than thought."""
+    careful: tuple[Session, ...]
+    """More room for friction that is lower than thought; the first of them keeps links farther away where the object is round."""
     loose: Session
     """For starts that are worse than plans may be."""
     firm: Session
@@ -28,9 +28,11 @@ class ExecutorSessions:
         """Of the first task of ``scene``. Errors: as of `Session`."""
         hand = next(hand for hand in scene.hands if hand.name_in_scene == scene.tasks[0].hand)
         moved = next(entry for entry in scene.objects if entry.name == scene.tasks[0].object)
-        kinds = (PLANNER, careful_settings(moved), LOOSE, FIRM)
-        settings = (planner_settings(kind, work_share(hand)) for kind in kinds)
-        return cls(*(Session(scene, settings=kind) for kind in settings))
+
+        def opened(kind: Mapping[str, Any]) -> Session:
+            return Session(scene, settings=planner_settings(kind, work_share(hand)))
+
+        return cls(opened(PLANNER), tuple(opened(kind) for kind in careful_settings(moved)), opened(LOOSE), opened(FIRM))
 
 
 def planner_settings(settings: Mapping[str, Any], share: float) -> dict[str, Any]:
