@@ -60,6 +60,11 @@ export type FileHand = {
   fingers: Array<string>,
   /** Names of its joints, in the order of every joint vector. */
   joint_names: Array<string>,
+  /**
+   * Its joints that the plan does not move, and where each of them stands all along, in radians or metres: independent joints that belong
+   * to no finger. Absent where there are none, and where a robot carries the hand.
+   */
+  held_joints?: { [key in string]: number },
 };
 
 /** A plan file. */
@@ -248,6 +253,11 @@ export type PlanRobot = {
   name: string,
   /** Names of all its independent joints, in the order of its layout: the order of every joint vector. */
   joint_names: Array<string>,
+  /**
+   * Its joints that no plan moves, and where each of them stands all along, in radians or metres: `[held]` of the robot file. Absent
+   * where there are none.
+   */
+  held_joints?: { [key in string]: number },
 };
 
 /** What the plan promises; the checker holds it to these numbers. */

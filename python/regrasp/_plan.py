@@ -80,6 +80,8 @@ class Plan:
         self.object: str = fields["object"]
         """Name of the object that it moves. All else rests."""
         self.joint_names: tuple[str, ...] = tuple(fields["joint_names"])
+        self.held_joints: Mapping[str, float] = fields["held_joints"]
+        """Joints of the hand that the plan does not move, and where each of them has to stand all along, in radians or metres."""
         self.fingers: tuple[str, ...] = tuple(fields["fingers"])
         self.method: str = fields["method"]
         self.seed: int = fields["seed"]

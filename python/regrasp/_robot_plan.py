@@ -73,6 +73,11 @@ class RobotPlan:
         return json.loads(self._native.to_json())
 
     @cached_property
+    def held_joints(self) -> dict[str, float]:
+        """Joints of its robots that no plan moves, and where each of them has to stand all along, in radians or metres."""
+        return {name: float(at) for robot in self.document["robots"] for name, at in robot.get("held_joints", {}).items()}
+
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names of all joints, in the order of `joints`."""
         return tuple(name for robot in self.document["robots"] for name in robot["joint_names"])

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import regrasp
-from conftest import SCENES
+from conftest import REPOSITORY, SCENES
 
 
 def test_the_same_bytes_as_the_command_line(regrasp_cli, tmp_path: Path, scene: regrasp.Scene) -> None:
@@ -152,3 +152,28 @@ def test_arguments_of_in_hand_tasks_are_refused_for_tracking(argument: dict[str,
         regrasp.plan(scene, **argument)
     (name,) = argument
     assert caught.value.code == "A507" and name in caught.value.element and caught.value.fix
+
+
+def test_joints_that_stand_still_are_in_the_plan_and_in_what_is_exported(tmp_path: Path) -> None:
+    hand = REPOSITORY / "assets/hands/nine_motors/hand.urdf"
+    lines = [
+        'format = "regrasp-scene"\nformat_version = 1\ntask = "in_hand"',
+        f'[hand]\nfile = "{hand}"',
+        '[object]\nname = "ball"\nsphere = { radius = 0.06 }\nmass = 0.1\nfriction = 0.8',
+        '[start]\nposition = [0.0821, 0.0279, 0.1264]\n[goal]\nturn = { axis = "z", angle_deg = 90 }\n',
+    ]
+    (tmp_path / "scene.toml").write_text("\n".join(lines))
+    plan = regrasp.plan(tmp_path / "scene.toml", hold=True)
+    assert isinstance(plan, regrasp.Plan), plan
+    # By the URDF: the middle of what the motors' own limits and those of their followers leave.
+    stand = {"finger_spread": 0.29, "thumb_opposition": 0.49}
+    assert plan.held_joints == stand
+    assert json.loads(plan.to_json())["hands"][0]["held_joints"] == stand
+    assert regrasp.Plan.from_json(plan.to_json()).held_joints == stand
+    assert '"finger_spread" at 0.29, "thumb_opposition" at 0.49' in plan.to_ros2()
+    plan.to_npz(tmp_path / "plan.npz")
+    with np.load(tmp_path / "plan.npz", allow_pickle=False) as arrays:
+        assert dict(zip(arrays["held_joint_names"].tolist(), arrays["held_joints"].tolist())) == stand
+    elsewhere = plan.to_json().replace(b'"finger_spread":0.29', b'"finger_spread":0.3')
+    report = regrasp.check(regrasp.Plan.from_json(elsewhere), tmp_path / "scene.toml", hold=True)
+    assert not report and [violation.kind for violation in report.violations] == ["wrong_scene"]

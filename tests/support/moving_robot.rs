@@ -121,7 +121,7 @@ pub fn straight(scene: &Scene, query: &MotionQuery, corners: &[Vec<f64>], pieces
     plan
 }
 
-/// A robot whose chest stays upright: torso_3 follows two joints.
+/// A robot whose chest stays upright: torso_3 follows two joints. Its head stands still, nodding.
 pub fn upright() -> (tempfile::TempDir, LoadedScene) {
     let folder = tempfile::tempdir().unwrap();
     let joint = |name: &str, parent: &str, child: &str, z: f64| {
@@ -137,17 +137,19 @@ pub fn upright() -> (tempfile::TempDir, LoadedScene) {
         )
     };
     let urdf = format!(
-        "<robot name='upright'>{}{}{}{}{}{}{}</robot>",
+        "<robot name='upright'>{}{}{}{}{}{}{}{}{}</robot>",
         link("base"),
         link("lower"),
         link("upper"),
         link("chest"),
+        link("head"),
         joint("torso_1", "base", "lower", 0.1),
         joint("torso_2", "lower", "upper", 0.3),
-        joint("torso_3", "upper", "chest", 0.3)
+        joint("torso_3", "upper", "chest", 0.3),
+        joint("neck", "chest", "head", 0.3)
     );
     std::fs::write(folder.path().join("body.urdf"), urdf).unwrap();
-    let robot = "format = \"regrasp-robot\"\nformat_version = 1\n[[models]]\nurdf = \"body.urdf\"\n[[couplings]]\njoint = \"torso_3\"\n\
+    let robot = "format = \"regrasp-robot\"\nformat_version = 1\n[[models]]\nurdf = \"body.urdf\"\n[held]\nneck = 0.3\n[[couplings]]\njoint = \"torso_3\"\n\
                  terms = [{ leader = \"torso_1\", multiplier = -1.0 }, { leader = \"torso_2\", multiplier = -1.0 }]\n";
     std::fs::write(folder.path().join("robot.toml"), robot).unwrap();
     let scene = "format = \"regrasp-scene\"\nformat_version = 2\n[robot]\nfile = \"robot.toml\"\n[[tasks]]\ntask = \"motion\"\n\

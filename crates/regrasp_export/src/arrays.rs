@@ -23,6 +23,10 @@ pub struct PlanArrays {
     pub holders: Vec<String>,
     /// Names of the joints, j of them, in the order of the columns of joint arrays.
     pub joint_names: Vec<String>,
+    /// Names of the joints that stand still all along.
+    pub held_joint_names: Vec<String>,
+    /// Where each of them stands.
+    pub held_joints: Vec<f64>,
     /// Names of the fingers, f of them, in the order of the columns of contact arrays.
     pub fingers: Vec<String>,
     /// n: seconds from the start.
@@ -148,6 +152,8 @@ impl PlanArrays {
             hand_of_joint: vec![0; plan.joint_names.len()],
             hand_of_finger: vec![0; plan.fingers.len()],
             joint_names: plan.joint_names.clone(),
+            held_joint_names: plan.held_joints.keys().cloned().collect(),
+            held_joints: plan.held_joints.values().copied().collect(),
             fingers: plan.fingers.clone(),
             times: waypoints.iter().map(|waypoint| waypoint.time).collect(),
             joints: of_joints(|waypoint| &waypoint.joints),

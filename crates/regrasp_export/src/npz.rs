@@ -14,6 +14,7 @@ use zip::{CompressionMethod, DateTime};
 pub fn to_npz(plan: &Plan) -> Result<Vec<u8>, ExportError> {
     for (what, texts) in [
         ("the joint names", plan.joint_names.as_slice()),
+        ("the names of joints that stand still", &plan.held_joints.keys().cloned().collect::<Vec<String>>()),
         ("the finger names", &plan.fingers),
         ("the hand's name", std::slice::from_ref(&plan.hand)),
         ("the object's name", std::slice::from_ref(&plan.object)),
@@ -38,6 +39,9 @@ pub fn to_npz(plan: &Plan) -> Result<Vec<u8>, ExportError> {
     file.add("objects", &names(&arrays.objects));
     file.add("holders", &names(&arrays.holders));
     file.add("joint_names", &names(&arrays.joint_names));
+    file.add("held_joint_names", &names(&arrays.held_joint_names));
+    let held = Numbers::Floats(&arrays.held_joints);
+    file.add("held_joints", &npy(held.numpy_type(), &[arrays.held_joints.len()], held.to_bytes()));
     file.add("fingers", &names(&arrays.fingers));
     file.add("hand_of_joint", &integers(&[arrays.joint_names.len()], &arrays.hand_of_joint));
     file.add("hand_of_finger", &integers(&[arrays.fingers.len()], &arrays.hand_of_finger));

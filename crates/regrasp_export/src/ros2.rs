@@ -7,6 +7,7 @@
 use crate::error::{ExportError, LATEST_TIME};
 use crate::yaml::{list, quoted};
 use regrasp_plan::{Plan, Waypoint};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Nanoseconds in a second.
@@ -24,6 +25,7 @@ pub fn to_ros2(plan: &Plan) -> Result<String, ExportError> {
         plan.tool.replace(char::is_control, " ")
     );
     out.push_str("header:\n  stamp: {sec: 0, nanosec: 0}\n  frame_id: \"\"\n");
+    out.push_str(&standing_still(&plan.held_joints));
     let names: Vec<String> = plan.joint_names.iter().map(|name| quoted(name)).collect();
     let _ = writeln!(out, "joint_names: [{}]\npoints:", names.join(", "));
     for (waypoint, nanoseconds) in points(plan)? {
@@ -35,6 +37,16 @@ pub fn to_ros2(plan: &Plan) -> Result<String, ExportError> {
         let _ = writeln!(out, "  time_from_start: {{sec: {sec}, nanosec: {nanosec}}}");
     }
     Ok(out)
+}
+
+/// A comment that says where the joints have to stand that a plan does not move: controllers refuse joints that are not theirs, so they are
+/// in no message. Empty where there are none.
+pub(crate) fn standing_still(positions: &BTreeMap<String, f64>) -> String {
+    if positions.is_empty() {
+        return String::new();
+    }
+    let each = positions.iter().map(|(name, position)| format!("{} at {position}", quoted(name)));
+    format!("# Joints that have to stand still meanwhile: {}.\n", each.collect::<Vec<String>>().join(", "))
 }
 
 /// Waypoints with their times in nanoseconds, which increase. Only where segments meet may two have the same.

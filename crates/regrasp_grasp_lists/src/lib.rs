@@ -99,6 +99,7 @@ fn view_of<'a>(hand: &'a Hand, object: &'a Object) -> HandView<'a> {
         object_index: 0,
         hand_name: "hand",
         hand,
+        held_joints: hand.held_joints(),
         world_from_hand: regrasp_geometry::Pose::identity(),
         reach: None,
         object,

@@ -61,6 +61,14 @@ impl Breeder<'_> {
             plan.promises.tracking.is_none().then_some(())
         });
         self.add("two joint names swapped", &[WrongScene], |plan, rng| swap_two(&mut plan.joint_names, rng));
+        self.add("joint that stands still invented", &[WrongScene], |plan, rng| {
+            plan.held_joints.insert("no_such_joint".into(), rng.uniform(-1.0, 1.0)).is_none().then_some(())
+        });
+        self.add("joint that stands still left out", &[WrongScene], |plan, _| plan.held_joints.pop_first().map(|_| ()));
+        self.add("joint that stands still elsewhere", &[WrongScene], |plan, rng| {
+            *plan.held_joints.values_mut().next()? += rng.uniform(1e-6, 1e-3);
+            Some(())
+        });
         self.add("two finger names swapped", &[WrongScene], |plan, rng| swap_two(&mut plan.fingers, rng));
         self.add("hand of another name", &[WrongScene], |plan, _| {
             plan.hand.push('2');

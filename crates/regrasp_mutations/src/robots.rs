@@ -107,6 +107,17 @@ impl Breeder<'_> {
     }
 
     fn break_header(&mut self) {
+        self.add("joint that stands still invented", &[Kind::WrongScene], |plan, rng| {
+            let held = &mut plan.robots[0].held_joints;
+            held.insert("no_such_joint".into(), rng.uniform(-1.0, 1.0)).is_none().then_some(())
+        });
+        self.add("joint that stands still left out", &[Kind::WrongScene], |plan, _| {
+            plan.robots[0].held_joints.pop_first().map(|_| ())
+        });
+        self.add("joint that stands still elsewhere", &[Kind::WrongScene], |plan, rng| {
+            *plan.robots[0].held_joints.values_mut().next()? += rng.uniform(1e-6, 1e-3);
+            Some(())
+        });
         self.add("another file", &[Kind::InputHashMismatch], |plan, rng| {
             let k = rng.below(plan.inputs.len());
             plan.inputs[k].sha256 = format!("{:064x}", rng.below(usize::MAX));

@@ -2,6 +2,8 @@
 
 /// The checker: starts from files, shares no decision with the planner.
 pub mod check;
+/// Objects of plan files in which every key stands once.
+mod each_once;
 /// Reading and writing `plan.json`, and its JSON Schema.
 pub mod format;
 /// The plan and its parts.

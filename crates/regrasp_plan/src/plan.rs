@@ -7,6 +7,7 @@
 pub use regrasp_grasp::record::{PlanInput, PoseData};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Value of [`Plan::format`].
 pub const FORMAT: &str = "regrasp-plan";
@@ -375,7 +376,7 @@ pub struct Statistics {
     /// True when a wall-clock limit cut something, so that another machine may find another plan.
     pub cut_by_time: bool,
     /// Attempts that failed, by cause.
-    pub failures: std::collections::BTreeMap<String, u64>,
+    pub failures: BTreeMap<String, u64>,
     /// What became of the first plan; absent where none was asked to be improved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub improvement: Option<Box<Improvement>>,
@@ -453,6 +454,10 @@ pub struct Plan {
     pub promises: Promises,
     /// Names of the joints, in the order of every joint vector.
     pub joint_names: Vec<String>,
+    /// Joints of the hand that the plan does not move, and the position of each all along, in radians or metres: independent joints that
+    /// belong to no finger. Joints that follow others are not among them, nor joints of a robot that carries the hand.
+    #[serde(skip)]
+    pub held_joints: BTreeMap<String, f64>,
     /// Names of the fingers, in the order of every contact list.
     pub fingers: Vec<String>,
     /// Object pose asked for at the start.

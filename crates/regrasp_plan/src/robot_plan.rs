@@ -3,6 +3,7 @@
 //! Between two waypoints every joint follows the cubic through positions, velocities and times. An object that a hand holds follows
 //! that hand: it keeps the pose in the frame of the hand's base that it has at the first waypoint of the segment.
 
+use crate::each_once;
 use crate::plan::{ContactMode, FORMAT, FORMAT_VERSION, PlanInput, PoseData, Promises};
 use regrasp_robot::Manipulator;
 use regrasp_robot::manipulator::layout::Coordinate;
@@ -10,10 +11,8 @@ use regrasp_scene::motion::MOTION;
 use regrasp_scene::pick_and_place::PICK_AND_PLACE;
 use regrasp_scene::{CarriedObject, Holder, MotionQuery, PickAndPlaceQuery, Scene, SceneHand};
 use schemars::JsonSchema;
-use serde::de::{Error, MapAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt;
 
 /// Kind of a segment of a [`RobotPlan`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -49,6 +48,11 @@ pub struct PlanRobot {
     pub name: String,
     /// Names of all its independent joints, in the order of its layout: the order of every joint vector.
     pub joint_names: Vec<String>,
+    /// Its joints that no plan moves, and where each of them stands all along, in radians or metres: `[held]` of the robot file. Absent
+    /// where there are none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "each_once::positions")]
+    #[cfg_attr(test, ts(optional, as = "Option<BTreeMap<String, f64>>"))]
+    pub held_joints: BTreeMap<String, f64>,
 }
 
 /// A hand that holds something or moves its fingers.
@@ -131,7 +135,7 @@ pub struct RobotSegment {
     /// Its kind.
     pub kind: RobotSegmentKind,
     /// For every object of `objects`, who holds it: names of hands and supports.
-    #[serde(deserialize_with = "holders_each_once")]
+    #[serde(deserialize_with = "each_once::holders")]
     pub held_by: BTreeMap<String, Vec<String>>,
     /// In a `transfer` or `regrasp`: which finger moves, and torques. Absent in all other kinds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -292,7 +296,11 @@ impl RobotPlan {
                 })
                 .collect(),
             promises: RobotPromises::of(scene, robot),
-            robots: vec![PlanRobot { name: robot.name.clone(), joint_names: robot.layout.names() }],
+            robots: vec![PlanRobot {
+                name: robot.name.clone(),
+                joint_names: robot.layout.names(),
+                held_joints: robot.held_joints.clone(),
+            }],
             hands: Vec::new(),
             objects: Vec::new(),
             statistics: RobotStatistics::default(),
@@ -339,7 +347,8 @@ impl RobotPlan {
         let promises = promises.chain(in_hand.values().flat_map(Promises::numbers));
         let parts = self.segments.iter().filter_map(|segment| segment.in_hand.as_ref());
         let torques = parts.flat_map(|part| part.joint_torques.iter().flatten().copied());
-        promises.chain(torques).chain(self.waypoints().flat_map(RobotWaypoint::numbers))
+        let held = self.robots.iter().flat_map(|robot| robot.held_joints.values().copied());
+        promises.chain(torques).chain(held).chain(self.waypoints().flat_map(RobotWaypoint::numbers))
     }
 }
 
@@ -379,28 +388,4 @@ impl RobotWaypoint {
         };
         std::iter::once(self.time).chain(joints).chain(poses).chain(self.contacts.iter().flat_map(of_contact))
     }
-}
-
-/// Reads holders. An object named twice is an error: readers would differ in what they take.
-fn holders_each_once<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, Vec<String>>, D::Error> {
-    struct Entries;
-    impl<'de> Visitor<'de> for Entries {
-        type Value = BTreeMap<String, Vec<String>>;
-
-        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-            f.write_str("names of objects, each with a list of those that hold it")
-        }
-
-        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
-            let mut found = BTreeMap::new();
-            while let Some((object, holders)) = map.next_entry::<String, Vec<String>>()? {
-                if found.contains_key(&object) {
-                    return Err(A::Error::custom(format!("duplicate field `{object}`")));
-                }
-                found.insert(object, holders);
-            }
-            Ok(found)
-        }
-    }
-    deserializer.deserialize_map(Entries)
 }

@@ -84,6 +84,7 @@ impl Plan {
             for (key, name) in [("query", &self.plan.query), ("hand", &self.plan.hand), ("object", &self.plan.object)] {
                 header[key] = name.as_str().into();
             }
+            header["held_joints"] = json!(self.plan.held_joints);
             let segments = self.plan.segments.iter().map(|segment| {
                 json!({
                     "kind": segment.kind,

@@ -3,11 +3,11 @@
 use crate::coupling::Coupling;
 use crate::kinematics::chain::Chain;
 use crate::kinematics::finger_ik::FingerIk;
-use crate::robot::{JointId, LinkId, Robot};
+use crate::robot::{Joint, JointId, LinkId, Robot};
 use crate::tip::Tip;
 use regrasp_geometry::Shape;
 use regrasp_geometry::shape::PlacedShape;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Most fingers of a hand: more are a mistake in the file. Planners may take fewer.
@@ -103,6 +103,23 @@ impl Hand {
     /// Names of the independent joints, finger by finger: the order of every joint vector.
     pub fn joint_names(&self) -> Vec<String> {
         self.fingers.iter().flat_map(|finger| finger.chain.names.iter().cloned()).collect()
+    }
+
+    /// Independent joints of its URDF that belong to no finger, by name, and the positions at which they stand while the fingers move,
+    /// in radians or metres: what the hand file says, else as near to zero as their limits let them.
+    ///
+    /// Of a hand that no robot carries: on a robot they are coordinates of the robot.
+    pub fn held_joints(&self) -> BTreeMap<String, f64> {
+        let of_fingers: BTreeSet<&String> = self.fingers.iter().flat_map(|finger| &finger.chain.names).collect();
+        let joints = self.robot.joints.iter().enumerate();
+        let stand = joints.filter(|(_, joint)| joint.moves() && joint.coupling.is_none());
+        let stand = stand.filter(|(_, joint)| !of_fingers.contains(&joint.name));
+        let position = |index: usize, joint: &Joint| {
+            // Joints with a position of their own have their zero there.
+            let zero = self.held.iter().find(|(held, _)| held.0 == index).map_or(0.0, |(_, position)| *position);
+            zero + joint.nearest_to_zero()
+        };
+        stand.map(|(index, joint)| (joint.name.clone(), position(index, joint))).collect()
     }
 
     /// Number of independent joints.

@@ -105,6 +105,11 @@ impl Joint {
         self.kind != JointKind::Fixed
     }
 
+    /// The position nearest to zero that its limits allow.
+    pub fn nearest_to_zero(&self) -> f64 {
+        self.limits.map_or(0.0, |limits| 0.0f64.clamp(limits.lower, limits.upper))
+    }
+
     /// Pose of the child's frame in the joint frame at `position`; the identity for a fixed joint.
     pub fn motion(&self, position: f64) -> Pose {
         match self.kind {

@@ -301,6 +301,35 @@ fn pairs_that_a_hand_file_excuses_stay_excused_in_what_inspect_writes() {
     assert!(!regrasp_robot::inspect::hand_file_text(&plain.hand, "hand.urdf", &none).contains("allow"));
 }
 
+/// A wrist below the palm and a thing that turns on it: where they stand is the URDF's own position, of the one that is said and of the one
+/// that is not.
+#[test]
+fn joints_of_no_finger_stand_where_the_file_says_or_as_near_to_zero_as_they_can() {
+    let folder = tempfile::tempdir().unwrap();
+    let joint = |name: &str, lower: f64| {
+        format!(
+            r#"<link name="{name}_link"><collision><origin xyz="0 0 -0.05"/><geometry><box size="0.01 0.01 0.01"/></geometry></collision></link>
+            <joint name="{name}" type="revolute"><parent link="root"/><child link="{name}_link"/><axis xyz="1 0 0"/>
+            <limit lower="{lower}" upper="1" effort="1" velocity="1"/></joint>"#
+        )
+    };
+    let parts =
+        [joint("wrist", -0.5), joint("lamp", 0.2), finger("i", "root"), finger("m", "root"), finger("t", "root")];
+    let fingers = format!("{}{}{}", table("i", ""), table("m", ""), table("t", ""));
+    let text = format!("{HEAD}[held]\nwrist = -0.25\n{fingers}");
+    let loaded = load(folder.path(), &parts.concat(), &text, "hand.toml", None).unwrap();
+    let found: Vec<(String, f64)> = loaded.hand.held_joints().into_iter().collect();
+    assert_eq!(found, [("lamp".to_owned(), 0.2), ("wrist".to_owned(), -0.25)]);
+    // The boxes are where those positions put them, by hand.
+    for (name, angle) in found {
+        let link = loaded.hand.robot.link_named(&format!("{name}_link")).unwrap();
+        let placed = &loaded.hand.palm.iter().find(|shape| shape.link == link).unwrap().placed;
+        let expected = regrasp_geometry::Vector::new(0.0, 0.05 * angle.sin(), -0.05 * angle.cos());
+        let found = placed.parent_from_shape.translation.vector;
+        assert!((found - expected).norm() < 1e-12, "{name}: {found} {expected}");
+    }
+}
+
 #[test]
 fn spreads_that_fingers_share_by_a_coupling_are_held() {
     let mimic = |text: &str| text.replacen(r#"upper="1"/></joint>"#, r#"upper="1"/><mimic joint="i_low"/></joint>"#, 1);
@@ -355,6 +384,8 @@ fn motors_that_fingers_share_are_held_where_the_file_says() {
     ] {
         let loaded = load(folder.path(), &parts, &text, "hand.toml", None).unwrap();
         assert_eq!(held(&loaded), [("i_low".to_owned(), expected)]);
+        // The follower is not commanded.
+        assert_eq!(loaded.hand.held_joints().into_iter().collect::<Vec<_>>(), [("i_low".to_owned(), expected)]);
         assert_eq!(summary(&loaded).1, [vec!["i_high"], vec!["m_high"], vec!["t_low", "t_high"]]);
         // By the two joints alone: the tips of i and m, 0.04 above the second joint, which is 0.04 above the first.
         let turned = |angle: f64| 0.03 + 0.08 * angle.sin();

@@ -8,6 +8,7 @@ use crate::scene::{InputFile, Obstacle};
 use regrasp_geometry::Pose;
 use regrasp_robot::Hand;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 /// One hand and the object that it manipulates, with everything else of the scene as obstacles. All poses are in the hand's frame.
 ///
@@ -22,6 +23,8 @@ pub struct HandView<'a> {
     pub hand_name: &'a str,
     /// The hand.
     pub hand: &'a Hand,
+    /// As [`crate::SceneHand::held_joints`].
+    pub held_joints: BTreeMap<String, f64>,
     /// Where the hand's base stands in the world.
     pub world_from_hand: Pose,
     /// As [`crate::SceneHand::reach`].
@@ -58,6 +61,7 @@ impl<'a> HandView<'a> {
             object_index,
             hand_name: &own.name,
             hand: &own.hand,
+            held_joints: own.held_joints(),
             world_from_hand: manipulation.world_from_hand(),
             reach: own.reach,
             object: manipulation.object(),

@@ -8,6 +8,7 @@ use regrasp_geometry::Pose;
 use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_robot::{Hand, Manipulator};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Something fixed in the world that nothing may touch.
@@ -42,6 +43,16 @@ pub struct SceneHand {
     /// Radius, in metres, of the balls that the centres of the fingertips may not leave: each is about where the tip is in the
     /// rest posture (Cherif & Gupta 1999, sec. 7: 0.1 m). None where the joints alone say what a finger reaches.
     pub reach: Option<f64>,
+}
+
+impl SceneHand {
+    /// As [`Hand::held_joints`]; none for a hand that a robot carries, whose joints are the robot's.
+    pub fn held_joints(&self) -> BTreeMap<String, f64> {
+        match self.carrier {
+            None => self.hand.held_joints(),
+            Some(_) => BTreeMap::new(),
+        }
+    }
 }
 
 /// Which hand of which robot a hand is.

@@ -184,6 +184,7 @@ impl<'a> Prepared<'a> {
                 object_index: query.object,
                 hand_name: &placed.name,
                 hand: &placed.hand,
+                held_joints: placed.held_joints(),
                 world_from_hand: Pose::identity(),
                 reach: None,
                 object,

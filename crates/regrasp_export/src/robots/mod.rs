@@ -5,6 +5,7 @@ mod contacts;
 use crate::arrays::Numbers;
 use crate::error::{ExportError, LATEST_TIME};
 use crate::npz::{Npz, integers, names, npy, refuse_too_long, texts};
+use crate::ros2::standing_still;
 use crate::yaml::{list, quoted};
 use regrasp_plan::robot_plan::{RobotPlan, RobotSegmentKind, RobotWaypoint};
 use regrasp_robot::{Manipulator, Part};
@@ -77,6 +78,10 @@ pub fn robot_to_npz(plan: &RobotPlan) -> Result<Vec<u8>, ExportError> {
     file.add("holders", &names(&holders));
     file.add("joint_names", &names(&joint_names));
     file.add("robot_of_joint", &integers(&[j], &robot_of_joint));
+    let held = plan.robots.iter().flat_map(|robot| &robot.held_joints);
+    let (held_names, held): (Vec<String>, Vec<f64>) = held.map(|(name, at)| (name.clone(), *at)).unzip();
+    file.add("held_joint_names", &names(&held_names));
+    file.add("held_joints", &floats(&[held.len()], &held));
     file.add("times", &floats(&[n], &waypoints.iter().map(|waypoint| waypoint.time).collect::<Vec<f64>>()));
     file.add("joints", &floats(&[n, j], &all(|waypoint| &waypoint.joints)));
     file.add("joint_velocities", &floats(&[n, j], &all(|waypoint| &waypoint.joint_velocities)));
@@ -143,6 +148,7 @@ pub fn robot_to_ros2(plan: &RobotPlan, groups: &[ControllerGroup]) -> Result<Str
     let points = points(plan)?;
     let everything = ControllerGroup { name: "all".into(), joints: (0..names.len()).collect() };
     let groups = if groups.is_empty() { std::slice::from_ref(&everything) } else { groups };
+    let held: String = plan.robots.iter().map(|robot| standing_still(&robot.held_joints)).collect();
     let mut out = String::new();
     for group in groups {
         let moves = |&&k: &&usize| points.windows(2).any(|pair| pair[0].0.joints[k] != pair[1].0.joints[k]);
@@ -156,6 +162,7 @@ pub fn robot_to_ros2(plan: &RobotPlan, groups: &[ControllerGroup]) -> Result<Str
             clean(&group.name),
             clean(&plan.tool)
         );
+        out.push_str(&held);
         out.push_str("# Radians, metres, seconds.\nheader:\n  stamp: {sec: 0, nanosec: 0}\n  frame_id: \"\"\n");
         let of_group: Vec<String> = group.joints.iter().map(|&k| quoted(&names[k])).collect();
         let _ = writeln!(out, "joint_names: [{}]\npoints:", of_group.join(", "));

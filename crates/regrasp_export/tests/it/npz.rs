@@ -97,6 +97,17 @@ fn every_number_of_the_plan_is_where_its_name_says() {
 }
 
 #[test]
+fn joints_that_stand_still_have_their_names_and_positions() {
+    let mut plan = PLAN.clone();
+    let arrays = read(&to_npz(&plan).unwrap());
+    assert_eq!((&arrays["held_joint_names"].shape, &arrays["held_joints"].shape), (&vec![0], &vec![0]));
+    plan.held_joints.extend([("wrist".to_owned(), 0.25), ("lamp".to_owned(), -1.5)]);
+    let arrays = read(&to_npz(&plan).unwrap());
+    assert_eq!(arrays["held_joint_names"].texts(), ["lamp", "wrist"]);
+    assert_eq!(arrays["held_joints"].floats(), [-1.5, 0.25]);
+}
+
+#[test]
 fn segments_and_their_waypoints_agree() {
     let plan = &*PLAN;
     let arrays = read(&to_npz(plan).unwrap());

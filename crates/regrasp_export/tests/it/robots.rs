@@ -33,6 +33,19 @@ fn every_part_that_moves_has_a_trajectory_of_its_own() {
 }
 
 #[test]
+fn joints_that_stand_still_are_named() {
+    let (_folder, upright) = upright();
+    let plan = plan_of(&upright, "");
+    let text = robot_to_ros2(&plan, &[]).unwrap();
+    assert!(text.contains("# Joints that have to stand still meanwhile: \"neck\" at 0.3.\n"), "{text}");
+    let archive = robot_to_npz(&plan).unwrap();
+    let archive = String::from_utf8_lossy(&archive);
+    assert!(archive.contains("held_joint_names.npy") && archive.contains("held_joints.npy"));
+    let loaded = load(&two_arms());
+    assert!(!robot_to_ros2(&plan_of(&loaded, "carry"), &[]).unwrap().contains("stand still"));
+}
+
+#[test]
 fn archives_are_the_same_bytes_and_have_all_arrays() {
     let loaded = load(&two_arms());
     let plan = plan_of(&loaded, "carry");

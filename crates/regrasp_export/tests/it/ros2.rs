@@ -56,6 +56,18 @@ fn where_segments_meet_the_torques_of_the_next_are_written() {
     }
 }
 
+/// A comment: controllers refuse joints that are not theirs.
+#[test]
+fn joints_that_stand_still_are_named_where_there_are_some() {
+    let mut plan = PLAN.clone();
+    let before = to_ros2(&plan).unwrap();
+    plan.held_joints.extend([("wrist".to_owned(), 0.25), ("a\"b".to_owned(), -1.0)]);
+    let text = to_ros2(&plan).unwrap();
+    let line = "# Joints that have to stand still meanwhile: \"a\\\"b\" at -1, \"wrist\" at 0.25.\n";
+    assert_eq!(text.replacen(line, "", 1), before);
+    assert_ne!(text, before);
+}
+
 /// A point that is left out is a motion that is left out: nothing is dropped in silence.
 #[test]
 fn times_that_do_not_increase_are_refused() {

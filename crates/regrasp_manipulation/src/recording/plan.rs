@@ -29,6 +29,7 @@ pub fn plan_of(view: &HandView, task: &str, ends: [&Pose; 2], promises: Promises
             .collect(),
         promises,
         joint_names: view.hand.joint_names(),
+        held_joints: view.held_joints.clone(),
         fingers: finger_names(view),
         start: PoseData::from(ends[0]),
         asked: None,

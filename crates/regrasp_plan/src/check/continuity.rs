@@ -12,9 +12,13 @@ use crate::plan::{ContactMode, ContactState, FORMAT, FORMAT_VERSION, Plan, PoseD
 use regrasp_geometry::Vector;
 use regrasp_scene::Query;
 use regrasp_scene::query::TRACKING;
+use std::collections::BTreeMap;
 
 /// Tasks that there are.
 const TASKS: [&str; 2] = ["in_hand", "tracking"];
+
+/// How far a joint that stands still may be from where the scene has it, in radians or metres: rounding.
+const STANDS_STILL: f64 = 1e-12;
 
 /// Names, vector lengths and numbers. When this finds something, nothing else can be judged.
 pub fn check_form(model: &CheckedHand, plan: &Plan, log: &mut Log) {
@@ -38,6 +42,13 @@ pub fn check_form(model: &CheckedHand, plan: &Plan, log: &mut Log) {
     let fingers: Vec<&str> = model.fingers.iter().map(|finger| finger.name.as_str()).collect();
     if plan.joint_names != model.joint_names {
         let message = format!("the plan's joints are {:?}, the scene's {:?}", plan.joint_names, model.joint_names);
+        log.push(Violation::new(Kind::WrongScene, message));
+    }
+    if !same_positions(&plan.held_joints, &model.held_joints) {
+        let message = format!(
+            "the plan's joints that stand still are {:?}, the scene's {:?}",
+            plan.held_joints, model.held_joints
+        );
         log.push(Violation::new(Kind::WrongScene, message));
     }
     if plan.fingers != fingers {
@@ -73,6 +84,11 @@ pub fn check_form(model: &CheckedHand, plan: &Plan, log: &mut Log) {
             check_waypoint_form(plan, waypoint, Moment::at(s, w), log);
         }
     }
+}
+
+/// True if both have the same joints at the same positions.
+pub fn same_positions(a: &BTreeMap<String, f64>, b: &BTreeMap<String, f64>) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() <= STANDS_STILL)
 }
 
 fn check_waypoint_form(plan: &Plan, waypoint: &Waypoint, at: Moment, log: &mut Log) {

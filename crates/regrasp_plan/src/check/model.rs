@@ -8,8 +8,9 @@ use nalgebra::Matrix4;
 use regrasp_geometry::{Point, Pose};
 use regrasp_robot::hand::Finger;
 use regrasp_robot::tip::Pad;
-use regrasp_robot::{ContactModel, JointKind, LinkId, Robot, TipShape};
+use regrasp_robot::{ContactModel, Hand, JointKind, LinkId, Robot, TipShape};
 use regrasp_scene::Manipulation;
+use std::collections::BTreeMap;
 
 /// A finger with its tip; a sharp tip is a ball of radius zero.
 #[derive(Debug, Clone)]
@@ -137,6 +138,8 @@ pub struct DriveRow {
 pub struct CheckedHand {
     /// Names of the coordinates of a joint vector.
     pub joint_names: Vec<String>,
+    /// Where its other independent joints stand; none for a hand that a robot carries.
+    pub held_joints: BTreeMap<String, f64>,
     /// True where the coordinate slides.
     pub slides: Vec<bool>,
     /// Fingers, in the order of the hand.
@@ -173,8 +176,28 @@ impl CheckedHand {
         }
         let (limits, drives) = joint_rows(task, &joint_names)?;
         let shape = SortedShape::of(&task.object().shape);
-        Ok(CheckedHand { slides, limits, drives, joint_names, fingers, world_from_root, shape })
+        let held_joints = match task.scene.hands[task.hand_index].carrier {
+            Some(_) => BTreeMap::new(),
+            None => held_joints(hand, &joint_names),
+        };
+        Ok(CheckedHand { held_joints, slides, limits, drives, joint_names, fingers, world_from_root, shape })
     }
+}
+
+/// Joints that are driven and not by the joint vector, and where the robot has them.
+fn held_joints(hand: &Hand, joint_names: &[String]) -> BTreeMap<String, f64> {
+    let mut held = BTreeMap::new();
+    for (index, joint) in hand.robot.joints.iter().enumerate() {
+        if joint.kind == JointKind::Fixed || joint.coupling.is_some() || joint_names.contains(&joint.name) {
+            continue;
+        }
+        let mut position = joint.limits.map_or(0.0, |limits| limits.lower.max(0.0).min(limits.upper));
+        if let Some((_, stated)) = hand.held.iter().find(|(id, _)| id.0 == index) {
+            position += stated;
+        }
+        held.insert(joint.name.clone(), position);
+    }
+    held
 }
 
 fn joint_rows(task: &Manipulation, joint_names: &[String]) -> Result<(Vec<LimitRow>, Vec<DriveRow>), String> {

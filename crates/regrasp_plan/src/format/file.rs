@@ -4,18 +4,16 @@
 //! refuses files with more.
 
 use super::caps;
+use crate::each_once;
 use crate::plan::{
     Asked, ContactMode, ContactState, Plan, PlanInput, PoseData, Promises, Segment, SegmentKind, Statistics, WayPose,
     Waypoint,
 };
 use regrasp_base::json_place::PathStep;
 use schemars::JsonSchema;
-use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fmt;
-use std::marker::PhantomData;
 
 /// A hand of the scene that the plan moves.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -28,6 +26,22 @@ pub(super) struct FileHand<'a> {
     pub fingers: Cow<'a, [String]>,
     /// Names of its joints, in the order of every joint vector.
     pub joint_names: Cow<'a, [String]>,
+    /// Its joints that the plan does not move, and where each of them stands all along, in radians or metres: independent joints that belong
+    /// to no finger. Absent where there are none, and where a robot carries the hand.
+    #[serde(default, skip_serializing_if = "is_empty", deserialize_with = "positions_each_once")]
+    #[cfg_attr(test, ts(optional, as = "Option<BTreeMap<String, f64>>"))]
+    pub held_joints: Cow<'a, BTreeMap<String, f64>>,
+}
+
+fn is_empty(positions: &BTreeMap<String, f64>) -> bool {
+    positions.is_empty()
+}
+
+/// Positions by the names of joints.
+fn positions_each_once<'de, 'a, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Cow<'a, BTreeMap<String, f64>>, D::Error> {
+    each_once::positions(deserializer).map(Cow::Owned)
 }
 
 /// A finger that touches an object.
@@ -92,30 +106,6 @@ pub(super) struct FileWaypoint<'a> {
 /// For every object, who holds it.
 type Holders<'a> = BTreeMap<Cow<'a, str>, Vec<Cow<'a, str>>>;
 
-/// Reads holders. An object named twice is an error: readers would differ in what they take.
-fn each_once<'de, 'a, D: Deserializer<'de>>(deserializer: D) -> Result<Holders<'a>, D::Error> {
-    struct Entries<'a>(PhantomData<Holders<'a>>);
-    impl<'de, 'a> Visitor<'de> for Entries<'a> {
-        type Value = Holders<'a>;
-
-        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-            f.write_str("names of objects, each with a list of those that hold it")
-        }
-
-        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
-            let mut found = Holders::new();
-            while let Some((object, holders)) = map.next_entry::<Cow<'a, str>, Vec<Cow<'a, str>>>()? {
-                if found.contains_key(&object) {
-                    return Err(A::Error::custom(format!("duplicate field `{object}`")));
-                }
-                found.insert(object, holders);
-            }
-            Ok(found)
-        }
-    }
-    deserializer.deserialize_map(Entries(PhantomData))
-}
-
 /// A piece of motion.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -133,7 +123,7 @@ pub(super) struct FileSegment<'a> {
     #[cfg_attr(test, ts(optional))]
     pub rolling_finger: Option<Cow<'a, str>>,
     /// For every object, who holds it: names of hands and supports.
-    #[serde(deserialize_with = "each_once")]
+    #[serde(deserialize_with = "each_once::holders")]
     pub held_by: Holders<'a>,
     /// At least two; the first is the last of the segment before, but for time and forces.
     pub waypoints: Vec<FileWaypoint<'a>>,
@@ -391,6 +381,7 @@ impl FilePlan<'_> {
             inputs: self.inputs.into_owned(),
             promises: self.promises.into_owned(),
             joint_names: hand.joint_names.into_owned(),
+            held_joints: hand.held_joints.into_owned(),
             fingers: names.fingers,
             start: self.start,
             asked: self.asked.map(|asked| Box::new(asked.into_owned())),

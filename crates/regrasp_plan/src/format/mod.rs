@@ -75,6 +75,7 @@ pub fn to_json(plan: &Plan) -> String {
         name: Cow::Borrowed(&plan.hand),
         fingers: Cow::Borrowed(&plan.fingers),
         joint_names: Cow::Borrowed(&plan.joint_names),
+        held_joints: Cow::Borrowed(&plan.held_joints),
     };
     field("hands", compact(&[hand]));
     field("objects", compact(&[&plan.object]));
@@ -203,4 +204,5 @@ fn all_numbers(plan: &Plan) -> impl Iterator<Item = f64> + '_ {
         .chain(plan.goal.numbers())
         .chain(waypoints)
         .chain(asked)
+        .chain(plan.held_joints.values().copied())
 }

@@ -24,7 +24,9 @@ pub(super) fn validate(path: &Path, text: &str, version: u32, plan: Plan) -> Res
 fn in_file<'a>(plan: &Plan, steps: &[PathStep<'a>]) -> Vec<PathStep<'a>> {
     use PathStep::{Index, Key};
     match steps {
-        [Key(key @ ("joint_names" | "fingers")), rest @ ..] => [&[Key("hands"), Index(0), Key(key)], rest].concat(),
+        [Key(key @ ("joint_names" | "held_joints" | "fingers")), rest @ ..] => {
+            [&[Key("hands"), Index(0), Key(key)], rest].concat()
+        }
         [Key("segments"), Index(s), Key("moving_finger"), rest @ ..] => {
             [&[Key("segments"), Index(*s), Key("moving"), Index(0)], rest].concat()
         }
@@ -92,6 +94,7 @@ impl Reader<'_> {
         let n_waypoints: usize = plan.segments.iter().map(|segment| segment.waypoints.len()).sum();
         for (key, seen, limit) in [
             ("joint_names", plan.joint_names.len(), caps::JOINTS),
+            ("held_joints", plan.held_joints.len(), caps::JOINTS),
             ("fingers", plan.fingers.len(), caps::FINGERS),
             ("inputs", plan.inputs.len(), caps::INPUTS),
             ("way_poses", plan.way_poses.len(), caps::WAY_POSES),
@@ -121,6 +124,17 @@ impl Reader<'_> {
                     self.fail("C408", &[Key(key), Index(i)], format!("\"{name}\" is used twice"), "each once".into());
                 }
             }
+        }
+        for (name, position) in &plan.held_joints {
+            let at = [Key("held_joints"), Key(name)];
+            if let Some(fault) = fault_of_name(name) {
+                self.fail("V004", &at, fault, GOOD_NAME.into());
+            }
+            if plan.joint_names.contains(name) {
+                let problem = format!("\"{name}\" is in \"joint_names\" too");
+                self.fail("C408", &at, problem, "a joint that stands still".into());
+            }
+            self.within(&at, *position, -caps::POSITION, caps::POSITION);
         }
         for (i, input) in plan.inputs.iter().enumerate() {
             if input.sha256.len() != 64

@@ -222,6 +222,11 @@ fn every_kind_of_damage_is_named_with_its_place() {
         f(&mut plan);
         to_json(&plan)
     };
+    let held = |joints: &[(&str, f64)]| {
+        cut(&|p| p.held_joints = joints.iter().map(|(name, at)| ((*name).to_owned(), *at)).collect())
+    };
+    let with_wrist = read(&held(&[("wrist", 0.1), ("lamp", -0.2)])).unwrap();
+    assert_eq!(with_wrist.held_joints.into_iter().collect::<Vec<_>>(), [("lamp".into(), -0.2), ("wrist".into(), 0.1)]);
     let waypoint_line = text.lines().position(|line| line.contains("{\"time\"")).unwrap() + 1;
     let third_line = waypoint_line + 2;
     let cases: Vec<(&str, String, String)> = vec![
@@ -270,6 +275,10 @@ fn every_kind_of_damage_is_named_with_its_place() {
             "has no \"forces\"".into(),
         ),
         ("C407", cut(&|p| p.segments[1].waypoints[2].contacts[1].torsion = Some(0.0)), "has an entry".into()),
+        ("V004", held(&[("a\nb", 0.1)]), "has the character U+000A".into()),
+        ("C408", held(&[(&plan.joint_names[2], 0.1)]), "\"joint_names\" too".into()),
+        ("C409", held(&[("wrist", 1e9)]), "hands[0].held_joints.wrist".into()),
+        ("C401", held(&[("wrist", 0.1), ("wrisp", 0.1)]).replace("wrisp", "wrist"), "duplicate field `wrist`".into()),
         ("C410", cut(&|p| p.fingers = (0..65).map(|i| i.to_string()).collect()), "65".into()),
     ];
     for (code, text, part) in cases {

@@ -14,7 +14,7 @@ use regrasp_robot::{
 };
 use regrasp_scene::scene::InputFile;
 use regrasp_scene::{GraspRequest, InHandQuery, Manipulation, Object, Query, Scene, SceneHand, State, TrackingQuery};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 pub const N_FINGERS: usize = 4;
@@ -362,6 +362,7 @@ pub fn plan_of(scene: &Scene, start: &Pose, goal: &Pose, segments: Vec<Segment>)
             forces: None,
         },
         joint_names,
+        held_joints: BTreeMap::new(),
         fingers: (0..N_FINGERS).map(|f| format!("f{f}")).collect(),
         start: PoseData::from(&(world_from_hand() * start)),
         asked: None,

@@ -10,13 +10,13 @@ use regrasp_manipulation::grasp::contact::draw_footholds;
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::workspace::Workspace;
 use regrasp_mutations::mutants;
-use regrasp_plan::check::{CheckSettings, check};
+use regrasp_plan::check::{CheckSettings, ViolationKind, check};
 use regrasp_plan::{ContactMode, Plan};
 use regrasp_planners::FailureKind;
 use regrasp_planners::in_hand::{InHandSettings, Method, plan_in_hand, validate_once};
 use regrasp_robot::import::{LoadOptions, ResolveOptions};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
-use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene, load_scene};
+use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene, Query, load_scene};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -207,6 +207,22 @@ fn a_hand_of_nine_motors_holds_and_is_told_that_it_cannot_turn() {
     let held = query.held();
     let plan = plan_in_hand(&loaded.view(), &held, &settings, 0, &Budget::work(1_000_000), &|_| {}).unwrap();
     accepted(&loaded, &held, &plan, &settings, "nine motors");
+    // Whoever carries it out has to know where the other two motors stand.
+    let stand = [("finger_spread", 0.29), ("thumb_opposition", 0.49)].map(|(name, at)| (name.to_owned(), at));
+    assert_eq!(plan.held_joints, std::collections::BTreeMap::from(stand));
+    for damage in [
+        |plan: &mut Plan| plan.held_joints.clear(),
+        |plan: &mut Plan| {
+            *plan.held_joints.get_mut("finger_spread").unwrap() += 1e-3;
+        },
+    ] {
+        let mut broken = plan.clone();
+        damage(&mut broken);
+        let query = Query::InHand(held.clone());
+        let report = check((&loaded.scene, &loaded.state), Some(&query), &broken, &CheckSettings::default());
+        let kinds: Vec<ViolationKind> = report.violations.iter().map(|violation| violation.kind).collect();
+        assert_eq!(kinds, [ViolationKind::WrongScene]);
+    }
 }
 
 /// The Barrett hand with its couplings: one motor spreads two fingers, one closes each.

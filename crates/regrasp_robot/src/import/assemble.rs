@@ -12,7 +12,7 @@ use super::spec::{Carried, FingerSpec, HandSpec, RigidBody, TipSpec};
 use super::tip_split;
 use crate::coupling::Coupling;
 use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape};
-use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
+use crate::robot::{JointId, JointKind, LinkId, Robot};
 use crate::tip::{Pad, Tip, TipEllipsoid, TipShape};
 use regrasp_base::diagnostic::Diagnostics;
 use regrasp_base::{Diagnostic, InputError, Place};
@@ -285,15 +285,11 @@ fn held_at(
             );
             return Pose::identity();
         }
-        Some(coupling) => coupling.position(|leader| nearest_to_zero(&robot.joints[leader.0])),
-        None => nearest_to_zero(joint),
+        Some(coupling) => coupling.position(|leader| robot.joints[leader.0].nearest_to_zero()),
+        None => joint.nearest_to_zero(),
     };
     notes.push(format!("joint \"{}\" belongs to no finger; held at {position}", joint.name));
     joint.motion(position)
-}
-
-fn nearest_to_zero(joint: &Joint) -> f64 {
-    joint.limits.map_or(0.0, |limits| 0.0f64.clamp(limits.lower, limits.upper))
 }
 
 fn make_finger(

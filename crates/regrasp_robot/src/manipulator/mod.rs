@@ -91,6 +91,8 @@ pub struct Manipulator {
     pub hands: Vec<MountedHand>,
     /// Pairs of links (smaller index first) that are never tested against each other.
     pub allowed_pairs: BTreeSet<(LinkId, LinkId)>,
+    /// Joints of its models that stand still, by name, and their positions in radians or metres; in `robot` they are fixed.
+    pub held_joints: BTreeMap<String, f64>,
     /// Where the root of the tree stands.
     world_from_root: Pose,
     /// The part of each link.
@@ -111,6 +113,8 @@ pub struct Parts {
     pub common: CommonPart,
     /// Pairs of links that are never tested, besides neighbours and those of the hands.
     pub allow: BTreeSet<(LinkId, LinkId)>,
+    /// Joints that stand still, by name, and their positions.
+    pub held: BTreeMap<String, f64>,
     /// Rest positions of joints on no finger and no arm, by name; the allowed position nearest to zero without one.
     pub rest: BTreeMap<String, f64>,
     /// How fast joints may speed up.
@@ -138,7 +142,7 @@ impl Manipulator {
     ///
     /// Errors: limits of joints that leave no posture.
     pub fn new(name: String, robot: Arc<Robot>, parts: Parts) -> Result<Self, NoPosture> {
-        let Parts { arms, hands, common, allow, rest, accelerations } = parts;
+        let Parts { arms, hands, common, allow, held, rest, accelerations } = parts;
         let owners = Owners::of(&robot, &arms, &hands);
         let mut posture = rest;
         for arm in &arms {
@@ -166,6 +170,7 @@ impl Manipulator {
             arms,
             hands,
             allowed_pairs,
+            held_joints: held,
             world_from_root: Pose::identity(),
             part_of_link: owners.of_links,
             fixed_hands: Vec::new(),

@@ -54,6 +54,8 @@ fn held_joints_are_no_coordinates_and_followers_of_them_stand_still() {
                 [held]\nroll = 0.7\nlean = -0.4\n";
     let robot = seen(&format!("{FILE}{more}")).unwrap();
     assert_eq!(robot.layout.names(), ["lift", "j1", "j2"]);
+    let held: Vec<_> = robot.held_joints.iter().map(|(name, at)| (name.as_str(), *at)).collect();
+    assert_eq!(held, [("lean", -0.4), ("roll", 0.7)]);
     compare(&robot, &|joint, of_state| match joint {
         "roll" => 0.7,
         "lean" => -0.4,

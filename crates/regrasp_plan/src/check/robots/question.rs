@@ -1,5 +1,6 @@
 //! What a plan of a whole robot is about: the robot, what it carries, and by what. Taken from the query, else from the plan.
 
+use crate::check::continuity::same_positions;
 use crate::check::robots::tree::{Frame, Tree};
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::robot_plan::RobotPlan;
@@ -90,6 +91,10 @@ impl<'a> Question<'a> {
         if joint_names != robot.layout.names() {
             let expected = robot.layout.names().join(", ");
             return Err(of_scene(format!("the joints of the plan are not those of the robot: {expected}")));
+        }
+        if !same_positions(&of_plan.held_joints, &robot.held_joints) {
+            let [seen, expected] = [&of_plan.held_joints, &robot.held_joints].map(|positions| format!("{positions:?}"));
+            return Err(of_scene(format!("the plan's joints that stand still are {seen}, the robot's {expected}")));
         }
         let tree = Tree::of(robot, &joint_names).map_err(of_scene)?;
         Ok(Question { index, robot, tree, joint_names, carried: Vec::new() })

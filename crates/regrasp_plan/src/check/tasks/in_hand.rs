@@ -13,6 +13,7 @@ use crate::plan::{ContactState, Plan, Promises, Segment, SegmentKind, Statistics
 use crate::robot_plan::{InHandPart, RobotContact, RobotPlan, RobotSegment, RobotSegmentKind, RobotWaypoint};
 use regrasp_scene::State;
 use regrasp_scene::query::IN_HAND;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Judges all motions in hands of a plan.
@@ -151,6 +152,7 @@ fn in_hand_plan(task: &Task, hand: usize, segments: &[RobotSegment], plan: &Robo
         inputs: plan.inputs.clone(),
         promises: promises.clone(),
         joint_names: joint_names.unwrap_or_default(),
+        held_joints: BTreeMap::new(),
         fingers,
         start: ends[0].world_from_objects[0],
         asked: None,

@@ -8,17 +8,19 @@ use crate::robot::{JointId, JointKind, Robot};
 use regrasp_base::Diagnostic;
 use regrasp_base::diagnostic::{did_you_mean, number};
 use regrasp_base::toml_table::{Entry, Found, Table};
+use std::collections::BTreeMap;
 
 /// Largest acceleration that a robot file may state, in radians or metres per second squared.
 const MAX_ACCELERATION: f64 = 1e6;
 /// The key of `[accelerations]` that stands for all other joints.
 const DEFAULT: &str = "default";
 
-/// Fixes the joints of `[held]` at their positions, and followers that are left without leaders.
+/// Fixes the joints of `[held]` at their positions, and followers that are left without leaders. Returns the names and positions of the
+/// former.
 ///
 /// Errors: unknown joints (`U205`), fixed ones and followers (`U220`), positions outside the limits (`U212`).
-pub(super) fn hold(entry: &Entry, tree: &mut Robot, found: &mut Found) {
-    let Some(table) = entry.table(found) else { return };
+pub(super) fn hold(entry: &Entry, tree: &mut Robot, found: &mut Found) -> BTreeMap<String, f64> {
+    let Some(table) = entry.table(found) else { return BTreeMap::new() };
     let mut held: Vec<(JointId, f64)> = Vec::new();
     for (name, entry) in table.all() {
         let Some(joint) = moving_joint(name, &entry, tree, found) else { continue };
@@ -43,9 +45,10 @@ pub(super) fn hold(entry: &Entry, tree: &mut Robot, found: &mut Found) {
             fix(joint, offset);
         }
     }
-    for (joint, value) in held {
+    for &(joint, value) in &held {
         fix(&mut tree.joints[joint.0], value);
     }
+    held.into_iter().map(|(joint, value)| (tree.joints[joint.0].name.clone(), value)).collect()
 }
 
 fn fix(joint: &mut crate::robot::Joint, position: f64) {

@@ -28,7 +28,7 @@ use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Entry, Found, Table};
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::Pose;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -131,9 +131,7 @@ fn read(
     if let Some(entry) = &couplings {
         couplings::read(entry, &mut draft.tree, found);
     }
-    if let Some(entry) = &held {
-        joints::hold(entry, &mut draft.tree, found);
-    }
+    let held = held.map_or_else(BTreeMap::new, |entry| joints::hold(&entry, &mut draft.tree, found));
     // Hands with URDFs of their own join the tree, before arms and hands are made of it.
     let arm_specs = arms.map_or_else(|| Some(Vec::new()), |entry| arms::read(&entry, &draft.tree, found));
     let arm_specs = arm_specs?;
@@ -161,6 +159,7 @@ fn read(
         hands,
         common: CommonPart::default(),
         allow: draft.allow,
+        held,
         rest: rest.iter().map(|(name, value, _)| (name.clone(), *value)).collect(),
         accelerations,
     };
