@@ -14,12 +14,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .executor import Executor, execute
+    from .executor import Executor
     from .faults import FaultyPlant
     from .foreign_plant import ForeignPlant, ForeignSettings
     from .goals import turns
     from .log import Event, GoalResult, RunLog
     from .mujoco_plant import MujocoPlant, PlantSettings
+    from .one_call import execute
     from .plant import Command, Observation, Plant
     from .sessions import ExecutorSessions
     from .settings import ExecutorSettings
@@ -58,7 +59,7 @@ _HOMES = {
     "Plant": "plant",
     "PlantSettings": "mujoco_plant",
     "RunLog": "log",
-    "execute": "executor",
+    "execute": "one_call",
     "turns": "goals",
 }
 

@@ -12,9 +12,9 @@ from .._errors import InputError
 from .._model import load_scene
 from ..simulate.model import Settings
 from ..simulate.reference import PlanError
-from .executor import execute
 from .goals import turns
 from .mujoco_plant import MujocoPlant, PlantSettings
+from .one_call import execute
 from .settings import ExecutorSettings
 
 

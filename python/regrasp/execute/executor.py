@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from .._result import Failure
 from .._session import Session, Start
 from ..simulate.model import Rig, Settings
 from ..simulate.reference import Array
-from .goals import between
+from .endings import GiveUp, GoOn, Withdrawn
+from .goals import Upcoming, between
 from .leg import Leg, first_rig
 from .log import Event, GoalResult, LegRecord, RunLog, Sample
 from .monitor import HOLDING, Monitor, Trigger, pose_error, why_gone
@@ -34,18 +36,6 @@ PASSING = frozenset({"deviation", "lost_contact", "slip"})
 LOSING = frozenset({"deviation", "slip", "lost_contact", "missed"})
 
 
-class _GiveUp(Exception):
-    """Nothing helps; the object is held."""
-
-    def __init__(self, status: str, message: str) -> None:
-        super().__init__(message)
-        self.status = status
-
-
-class _GoOn(Exception):
-    """There is no start here, and the leg that was stopped may go on."""
-
-
 class Executor:
     """Brings the object of a session to goal after goal."""
 
@@ -62,12 +52,14 @@ class Executor:
         firm: Sequence[Session] = (),
         stiffness: Array | None = None,
         damping: Array | None = None,
+        listener: Callable[[Event | GoalResult], None] | None = None,
     ) -> None:
         """session, plant: of the same hand. control: as the replay's settings, of which tick and speed count.
 
         planning: ``ThreadPlanning`` for robots; where nothing is said, ``ChargedPlanning`` for plants that know the truth, which are
         simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first; loose: that are asked last, and for starts that the session refuses; firm: that are asked before all
         others where ``grip`` says so. stiffness, damping: of the robot's joints, where they are not those of replays.
+        listener: is told every event, and what became of every goal, as it happens, on the thread that runs.
         """
         self._session = session
         self._plant = plant
@@ -82,6 +74,9 @@ class Executor:
             hold_time=0.0,
         )
         self._gains = (stiffness, damping)
+        self._listener = listener
+        self._is_withdrawn: Callable[[], bool] | None = None
+        self._waits: Callable[[], None] | None = getattr(plant, "wait", None)
         self._truth: Callable[[], tuple[Array, Array]] | None = getattr(plant, "truth", None)
         maker = planning or (ChargedPlanning if self._truth is not None else ThreadPlanning)
         self._planning = maker([*careful, session, *loose], self._settings, self._prepare)
@@ -112,22 +107,38 @@ class Executor:
 
     # ------------------------------------------------------------------------------------------------------------- whole runs
 
-    def run(self, goals: Iterable[Pose]) -> RunLog:
-        """Brings the object to every goal, in order. Ends with the hand holding, whatever happens; Ctrl-C is raised then."""
+    def run(self, goals: Iterable[Pose | None]) -> RunLog:
+        """Brings the object to every goal, in order. Ends with the hand holding, whatever happens; Ctrl-C is raised then.
+
+        goals: may yield ``None`` where there is no goal for now: the hand holds for a tick, and asks again. It must not wait itself. Where
+        it has a method ``is_withdrawn``, that is asked at every tick whether the present goal is still wanted; else the hand stops and holds.
+        """
         log = self.log
+        upcoming = Upcoming(goals)
         try:
             self._first_pose()
-            upcoming = iter(goals)
-            goal = next(upcoming, None)
             prepared: Ticket | None = None
             before = self._senses.quat
-            while goal is not None:
-                following = next(upcoming, None)
-                prepared, before = self._bring_to(goal, following, prepared, before)
+            while not upcoming.has_ended:
+                goal = upcoming.take()
+                if goal is None:
+                    if not upcoming.has_ended:
+                        self._tick(moves=False, state="idle")
+                    continue
+                started = self._senses.time
+                self._is_withdrawn = partial(upcoming.is_withdrawn, goal)
+                try:
+                    prepared, before = self._bring_to(goal, upcoming, prepared, before)
+                except Withdrawn:
+                    prepared, quat = None, np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
+                    self._event("withdrawn", "the goal is not wanted any more", "hold")
+                    n_legs = sum(leg.goal == self._goal_index for leg in log.legs)
+                    self._result(goal, quat, False, started, n_legs, 0.0, before, "withdrawn")
+                    before = self._senses.quat
+                self._is_withdrawn = None
                 self._goal_index += 1
-                goal = following
             log.status = "done"
-        except _GiveUp as end:
+        except GiveUp as end:
             log.status, log.message = end.status, str(end)
             self._event("object_gone" if end.status == "lost" else "gave_up", str(end), "give_up")
         except KeyboardInterrupt:
@@ -141,7 +152,7 @@ class Executor:
         return log
 
     def _bring_to(
-        self, goal: Pose, following: Pose | None, prepared: Ticket | None, before: Array
+        self, goal: Pose, upcoming: Upcoming, prepared: Ticket | None, before: Array
     ) -> tuple[Ticket | None, Array]:
         """To one goal; what was planned for the one after, and this goal's orientation."""
         settings = self._settings
@@ -157,7 +168,7 @@ class Executor:
             if ticket is None:
                 try:
                     ticket = self._query(goal, is_again=attempt > 0, has_missed=has_missed)
-                except _GoOn as cause:
+                except GoOn as cause:
                     self._event("no_start", str(cause), "resume")
             if ticket is not None:
                 self._wait_for(ticket)
@@ -177,7 +188,8 @@ class Executor:
                 n_legs += 1
                 self._begin(ticket, was_prepared)
                 ahead = None
-                if following is not None and settings.anytime and not (settings.replanning and attempt > 0):
+                following = upcoming.peek() if settings.anytime and not (settings.replanning and attempt > 0) else None
+                if following is not None:
                     ahead = self._ask_ahead(ticket.answer, following)
             begun = self._senses.time
             trigger = self._run_leg()
@@ -213,7 +225,7 @@ class Executor:
             if self._truth is not None:
                 true_distance, true_angle = pose_error(self._leg, *self._truth(), position, quat)
         apart = min(float(np.linalg.norm(quat - before)), float(np.linalg.norm(quat + before)))
-        self.log.goals.append(
+        self._tell(
             GoalResult(
                 position=position.tolist(),
                 quat_xyzw=np.array(goal.quat_xyzw).tolist(),
@@ -259,7 +271,7 @@ class Executor:
     def _predicted(self, plan: Plan) -> Start:
         start = self._session.project(Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1]), plan.joints[-1])
         if not isinstance(start, Start):
-            raise _GiveUp("gave_up", f"the end of a plan is no start: {start.message}")
+            raise GiveUp("gave_up", f"the end of a plan is no start: {start.message}")
         return start
 
     def _observed_start(self) -> Start:
@@ -278,18 +290,18 @@ class Executor:
                 return start
             gone = why_gone(self._leg, self._senses, self._settings)
             if gone:
-                raise _GiveUp("lost", f"{gone}; no start: {message}")
+                raise GiveUp("lost", f"{gone}; no start: {message}")
             if not told:
                 self._event("no_start", message, "hold")
                 told = True
             if self._may_go_on():
-                raise _GoOn(message)
+                raise GoOn(message)
             if self._go_back() or senses.time - since <= settings.patience:
                 continue
             if reach >= settings.last_reach:
                 n_felt = None if senses.forces is None else int((senses.forces > settings.lost_force).sum())
                 lost = "no finger touches" in message if n_felt is None else n_felt < HOLDING
-                raise _GiveUp("lost" if lost else "gave_up", f"no start: {message}")
+                raise GiveUp("lost" if lost else "gave_up", f"no start: {message}")
             # Before the hand gives up, a start farther off is good enough: the fingers go there from where they are.
             reach = settings.last_reach
 
@@ -341,8 +353,12 @@ class Executor:
 
     def _wait_for(self, ticket: Ticket) -> None:
         """Holds until the answer is there."""
-        while not self._planning.is_ready(ticket, self._senses.time):
-            self._tick(moves=False, state="hold")
+        try:
+            while not self._planning.is_ready(ticket, self._senses.time):
+                self._tick(moves=False, state="hold")
+        except Withdrawn:
+            ticket.cancelled.set()
+            raise
 
     def _is_off_start(self, ticket: Ticket) -> bool:
         """True where the object is not where a plan made ahead begins."""
@@ -364,20 +380,24 @@ class Executor:
     # ---------------------------------------------------------------------------------------------------------------- motion
 
     def _first_pose(self) -> None:
-        """Waits for the first pose; the plant does what it did before."""
+        """Waits for the first pose and joints; the plant does what it did before."""
         seen = self._plant.observe()
         since = seen.time
         self._take(seen)
-        while not self._senses.knows_pose:
+        while not (self._senses.knows_pose and self._senses.knows_joints):
             if self._senses.time - since > self._settings.patience:
-                raise _GiveUp("lost", "no pose of the object was ever seen")
+                what = "no pose of the object" if not self._senses.knows_pose else "not every joint"
+                raise GiveUp("lost", f"{what} was ever seen")
             self._wait()
 
     def _wait(self) -> None:
-        """One tick with the command before, or with the joints where they are."""
-        if self._last_command is None:
-            self._last_command = self._first_command()
-        self._plant.apply(self._last_command)
+        """One tick before the first leg: without a command where the plant can wait, else with one that holds."""
+        if self._waits is not None:
+            self._waits()
+        else:
+            if self._last_command is None:
+                self._last_command = self._first_command()
+            self._plant.apply(self._last_command)
         self._take(self._plant.observe())
 
     def _first_command(self) -> Command:
@@ -474,9 +494,9 @@ class Executor:
             now, gone = self._senses.time, why_gone(self._leg, self._senses, self._settings)
             gone_since = None if not gone else now if gone_since is None else gone_since
             if gone_since is not None and now - gone_since >= settings.gone_after:
-                raise _GiveUp("lost", gone)
+                raise GiveUp("lost", gone)
             if now - since > settings.patience:
-                raise _GiveUp("gave_up", f"{faults[0].kind}: {faults[0].message}")
+                raise GiveUp("gave_up", f"{faults[0].kind}: {faults[0].message}")
             faults = self._tick(moves=False, state="hold")
 
     def _settle(self, goal: Pose, quat: Array) -> tuple[float, float]:
@@ -519,8 +539,10 @@ class Executor:
             self._plant.apply(self._last_command)
             self._take(self._plant.observe())
         self._n_ticks += 1
-        if self._n_ticks % SAMPLED == 0:
+        if self._n_ticks % SAMPLED == 0 and state != "idle":
             self._sample(state, monitor)
+        if self._is_withdrawn is not None and self._is_withdrawn():
+            raise Withdrawn
         return self._current
 
     def _resting(self) -> Command:
@@ -570,23 +592,9 @@ class Executor:
         leg = len(self.log.legs) - 1
         if kind in LOSING and self._settings.grip == "firm after trouble":
             self._grips_firmer = True
-        self.log.events.append(Event(round(self._senses.time, 6), kind, message, answer, self._goal_index, leg))
+        self._tell(Event(round(self._senses.time, 6), kind, message, answer, self._goal_index, leg))
 
-
-def execute(
-    plant: Plant,
-    goals: Iterable[Pose],
-    *,
-    session: Session | None = None,
-    settings: ExecutorSettings | None = None,
-) -> RunLog:
-    """Brings the object of ``plant`` to every goal, in order.
-
-    session: of the plant's scene; a plant in MuJoCo knows its scene. The planner then has the settings of execution.
-    """
-    if session is not None:
-        return Executor(session, plant, settings).run(goals)
-    scene = getattr(plant, "scene", None)
-    if scene is None:
-        raise ValueError("the plant does not know its scene: give a session")
-    return Executor.of(ExecutorSessions.of(scene), plant, settings).run(goals)
+    def _tell(self, happening: Event | GoalResult) -> None:
+        self.log.add(happening)
+        if self._listener is not None:
+            self._listener(happening)

@@ -86,10 +86,10 @@ def main(arguments: list[str] | None = None) -> int:
     os.environ.setdefault("MUJOCO_GL", "egl")
     from .._model import load_scene
     from ..simulate._mujoco import mujoco
-    from .executor import execute
     from .faults import FaultyPlant
     from .goals import turns
     from .mujoco_plant import MujocoPlant, PlantSettings
+    from .one_call import execute
     from .plant import Command
 
     scene = load_scene(asked.scene, packages=dict(entry.split("=", 1) for entry in asked.package))

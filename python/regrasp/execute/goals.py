@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -31,3 +31,31 @@ def between(start: Pose, goal: Pose, share: float) -> Pose:
     first, last = (np.array(pose.quat_xyzw)[[3, 0, 1, 2]] for pose in (start, goal))
     turned = quat_product(quat_exp(share * rotation_vector(quat_product(last, quat_inverse(first)))), first)
     return Pose((1.0 - share) * np.array(start.position) + share * np.array(goal.position), turned[[1, 2, 3, 0]])
+
+
+class Upcoming:
+    """The goals of an iterable, with a look ahead. An iterable that has no goal for now yields ``None``, and is asked again."""
+
+    def __init__(self, goals: Iterable[Pose | None]) -> None:
+        self._withdrawn: Callable[[Pose], bool] | None = getattr(goals, "is_withdrawn", None)
+        self._goals = iter(goals)
+        self._ahead: Pose | None = None
+        self.has_ended = False
+
+    def peek(self) -> Pose | None:
+        """The next goal, if it is there by now."""
+        if self._ahead is None and not self.has_ended:
+            try:
+                self._ahead = next(self._goals)
+            except StopIteration:
+                self.has_ended = True
+        return self._ahead
+
+    def take(self) -> Pose | None:
+        """The same, and goes on to the one after."""
+        goal, self._ahead = self.peek(), None
+        return goal
+
+    def is_withdrawn(self, goal: Pose) -> bool:
+        """True where the iterable says that this goal is not wanted any more."""
+        return self._withdrawn is not None and self._withdrawn(goal)

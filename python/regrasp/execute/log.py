@@ -117,6 +117,13 @@ class RunLog:
     plans: list[Plan] = field(default_factory=list[Plan])
     """One per leg."""
 
+    def add(self, happening: Event | GoalResult) -> None:
+        """Takes over an event, or what became of a goal."""
+        if isinstance(happening, Event):
+            self.events.append(happening)
+        else:
+            self.goals.append(happening)
+
     @property
     def n_reached(self) -> int:
         """Goals that were reached."""

@@ -53,5 +53,10 @@ class Plant(Protocol):
         ...
 
     def apply(self, command: Command) -> None:
-        """Gives a command and waits until the next one is due. The plant keeps the last command that it has."""
+        """Gives a command and waits until the next one is due. The plant keeps the last command that it has.
+
+        Two members more are optional. ``holding``: the command that holds the object as the run begins. ``wait()``: waits for a tick and
+        gives no command. Before the first leg the executor waits where it can, else gives ``holding``, else tells the joints to stay where
+        they are.
+        """
         ...

@@ -50,6 +50,11 @@ class Senses:
         return self._filter is not None
 
     @property
+    def knows_joints(self) -> bool:
+        """True since every joint was seen."""
+        return self._has_joints
+
+    @property
     def position(self) -> Array:
         """Of the object's origin in the world."""
         assert self._filter is not None
