@@ -87,19 +87,35 @@ class RosPlant:
         self._clock = clock or WallClock()
         self._lock = threading.Lock()
         self._joints = np.full(len(self.joint_names), np.nan)
+        self._velocities = np.zeros(len(self.joint_names))
         self._heard = np.full(len(self.joint_names), -np.inf)
         self._stale_after = stale_after
         self._pose: tuple[float, Array, Array] | None = None
         self._due = self._clock.now()
 
     def on_joint_states(self, message: Any) -> None:
-        """Of ``sensor_msgs/JointState``: joints that are no joints of the hand are passed over. Joints may come in several messages."""
-        known = {name: position for name, position in zip(message.name, message.position)}
+        """Of ``sensor_msgs/JointState``: joints that are no joints of the hand are passed over. Joints may come in several messages, with
+        velocities or without: then they are what the position has changed since."""
+        known = {name: index for index, name in enumerate(message.name)}
+        has_velocities = len(message.velocity) == len(message.name)
         now = self._clock.now()
         with self._lock:
             for index, name in enumerate(self.joint_names):
-                if name in known:
-                    self._joints[index], self._heard[index] = float(known[name]), now
+                if name not in known:
+                    continue
+                position, since = float(message.position[known[name]]), now - self._heard[index]
+                if has_velocities:
+                    self._velocities[index] = float(message.velocity[known[name]])
+                elif 0.0 < since <= self._stale_after:
+                    self._velocities[index] = (position - self._joints[index]) / since
+                else:
+                    self._velocities[index] = 0.0
+                self._joints[index], self._heard[index] = position, now
+
+    def newest(self) -> tuple[Array, Array]:
+        """The last positions and velocities of the joints that were heard of, however long ago."""
+        with self._lock:
+            return self._joints.copy(), self._velocities.copy()
 
     def on_object_pose(self, message: Any) -> None:
         """Of ``geometry_msgs/PoseStamped``."""
@@ -258,9 +274,9 @@ def trajectory(message: Any, point: Any, joint_names: Sequence[str], command: Co
     return message
 
 
-def efforts(message: Any, command: Command, joints: Array, stiffness: Array) -> Any:
-    """Fills an empty ``Float64MultiArray`` with torques, for effort drives."""
-    message.data = [float(value) for value in command.servo - stiffness * joints]
+def efforts(message: Any, command: Command, joints: Array, velocities: Array, stiffness: Array, damping: Array) -> Any:
+    """Fills an empty ``Float64MultiArray`` with torques, for effort drives: those of a spring and a damper, and the planned ones."""
+    message.data = [float(value) for value in command.servo - stiffness * joints - damping * velocities]
     return message
 
 
@@ -301,7 +317,7 @@ def main(arguments: list[str] | None = None) -> int:
             message, point = types["JointTrajectory"](), types["JointTrajectoryPoint"]()
             out.publish(trajectory(message, point, plant.joint_names, command, max(due - time.time(), 0.001)))
         else:
-            out.publish(efforts(types["Float64MultiArray"](), command, plant.observe().joints, stiffness))
+            out.publish(efforts(types["Float64MultiArray"](), command, *plant.newest(), stiffness, damping))
 
     plant = RosPlant(session.hand.joint_names, [finger.name for finger in session.hand.fingers], send, tick=asked.tick)
     goals = Goals()

@@ -7,7 +7,7 @@ import json
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -56,19 +56,29 @@ def stamped(stamp: float, position: Any, quat_wxyz: Any) -> Any:
     )
 
 
+def joint_states(names: Sequence[str], positions: Any, velocities: Any = ()) -> Any:
+    return SimpleNamespace(name=list(names), position=[float(at) for at in positions], velocity=[float(at) for at in velocities])
+
+
 def test_messages_become_observations() -> None:
     clock = FakeClock()
     plant = ros2.RosPlant(["a", "b"], ["one"], lambda command, due: None, clock=clock)
     assert np.isnan(plant.observe().joints).all() and plant.observe().pose_stamp is None
-    plant.on_joint_states(SimpleNamespace(name=["b", "other", "a"], position=[2.0, 9.0, 1.0]))
+    plant.on_joint_states(joint_states(["b", "other", "a"], [2.0, 9.0, 1.0]))
     plant.on_object_pose(stamped(99.5, (1, 2, 3), (1, 0, 0, 0)))
     seen = plant.observe()
     assert seen.joints.tolist() == [1.0, 2.0] and seen.pose_stamp == pytest.approx(99.5) and seen.time == 100.0
     assert seen.object_position is not None and seen.object_position.tolist() == [1.0, 2.0, 3.0]
     # What is not heard of any more is missing: it is not made up.
     clock.time += 0.15
-    plant.on_joint_states(SimpleNamespace(name=["a"], position=[1.5]))
+    plant.on_joint_states(joint_states(["a"], [1.5]))
     assert plant.observe().joints.tolist() == [1.5, 2.0]
+    assert plant.newest()[1].tolist() == [pytest.approx(0.5 / 0.15), 0.0]
+    plant.on_joint_states(joint_states(["b", "a"], [2.0, 1.5], [-3.0, 4.0]))
+    assert plant.newest()[1].tolist() == [4.0, -3.0]
+    plant.on_joint_states(joint_states(["a"], [1.5]))
+    clock.time += 0.15
+    plant.on_joint_states(joint_states(["a"], [1.5]))
     clock.time += 0.1
     assert plant.observe().joints[0] == 1.5 and np.isnan(plant.observe().joints[1])
 
@@ -79,8 +89,9 @@ def test_commands_become_messages() -> None:
     message = ros2.trajectory(SimpleNamespace(), point, ["a", "b"], command, 1.25)
     assert message.joint_names == ["a", "b"] and message.points[0].positions == [0.1, 0.2]
     assert (point.time_from_start.sec, point.time_from_start.nanosec) == (1, 250_000_000)
-    torques = ros2.efforts(SimpleNamespace(), command, np.array([0.5, 0.5]), np.array([2.0, 2.0]))
-    assert torques.data == [0.0, 1.0]
+    joints, velocities = np.array([0.5, 0.5]), np.array([0.0, 3.0])
+    torques = ros2.efforts(SimpleNamespace(), command, joints, velocities, np.array([2.0, 2.0]), np.array([0.1, 0.1]))
+    assert torques.data == [0.0, pytest.approx(0.7)]
 
 
 def test_goals_wait_for_their_turn() -> None:
@@ -118,7 +129,7 @@ def test_a_robot_behind_messages_reaches_a_goal() -> None:
             positions = inner.rig.stiffness * sent[-1].positions + inner.rig.damping * sent[-1].velocities
             inner.apply(Command(positions, sent[-1].positions, sent[-1].velocities))
         seen = inner.observe()
-        plant.on_joint_states(SimpleNamespace(name=list(inner.joint_names), position=seen.joints.tolist()))
+        plant.on_joint_states(joint_states(inner.joint_names, seen.joints))
         if seen.pose_stamp is not None:
             plant.on_object_pose(stamped(100.0 + seen.pose_stamp, seen.object_position, seen.object_quat_wxyz))
 
@@ -137,6 +148,11 @@ def test_a_robot_behind_messages_reaches_a_goal() -> None:
     )
     log = executor.run(turns(inner.pose, count=1, seed=3))
     assert log.status == "done" and log.n_reached == 1, (log.message, log.goals, log.events)
+
+
+def rig_velocities(plant: MujocoPlant) -> Any:
+    model = plant.rig.model
+    return plant.data.qvel[[model.jnt_dofadr[model.joint(name).id] for name in plant.joint_names]]
 
 
 class Stack:
@@ -191,12 +207,17 @@ class Stack:
         if topic == "run_events":
             self.told.append(json.loads(message.data))
             return
-        assert topic == "joint_trajectory" and message.joint_names == list(self.inner.joint_names)
         self.n_commands += 1
-        point = message.points[0]
-        rig, velocities = self.inner.rig, np.array(point.velocities)
-        servo = rig.stiffness * np.array(point.positions) + rig.damping * velocities
-        self.inner.apply(Command(servo, np.array(point.positions), velocities))
+        rig = self.inner.rig
+        if topic == "joint_commands":
+            # The motors of the model have a spring and a damper of their own: torques without them.
+            joints, velocities = self.inner.observe().joints, rig_velocities(self.inner)
+            servo = np.array(message.data) + rig.stiffness * joints + rig.damping * velocities
+        else:
+            assert topic == "joint_trajectory" and message.joint_names == list(self.inner.joint_names)
+            point = message.points[0]
+            servo = rig.stiffness * np.array(point.positions) + rig.damping * np.array(point.velocities)
+        self.inner.apply(Command(servo, np.zeros(0), np.zeros(0)))
         self.send()
         if self.interrupts:
             self.interrupts = False
@@ -206,7 +227,7 @@ class Stack:
         """Joints and pose of now."""
         seen = self.inner.observe()
         if self.joints_are_seen:
-            self.heard["joint_states"](SimpleNamespace(name=list(self.inner.joint_names), position=seen.joints.tolist()))
+            self.heard["joint_states"](joint_states(self.inner.joint_names, seen.joints, rig_velocities(self.inner)))
         if seen.object_position is not None:
             self.heard["object_pose"](stamped(time.time(), seen.object_position, seen.object_quat_wxyz))
 
@@ -285,7 +306,10 @@ def test_the_node_serves_actions_and_goals_as_they_come(monkeypatch: pytest.Monk
 
 
 @pytest.mark.skipif(importlib.util.find_spec("rclpy") is not None, reason="ROS 2 is here")
-def test_the_node_waits_for_joints_and_goes_without_an_action(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("drives", ["position", "effort"])
+def test_the_node_waits_for_joints_and_goes_without_an_action(
+    drives: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     inner = MujocoPlant.of(SCENES / "sphere_90x.toml", PlantSettings(seed=2), seed=2)
     stack = Stack(inner)
     stack.joints_are_seen = False
@@ -295,7 +319,8 @@ def test_the_node_waits_for_joints_and_goes_without_an_action(monkeypatch: pytes
         monkeypatch.setitem(sys.modules, name, module)
     codes: list[int] = []
     arguments = [str(SCENES / "sphere_90x.toml"), "--stiffness", str(inner.rig.stiffness[0]), "--damping", str(inner.rig.damping[0])]
-    node = threading.Thread(target=lambda: codes.append(ros2.main([*arguments, "--tick", str(inner.tick)])), daemon=True)
+    arguments += ["--drives", drives, "--tick", str(inner.tick)]
+    node = threading.Thread(target=lambda: codes.append(ros2.main(arguments)), daemon=True)
     node.start()
     stack.send_until(lambda: {"waiting_for": list(inner.joint_names)} in stack.told)
     goal = next(turns(inner.pose, count=1, seed=3, largest=0.3))
@@ -305,9 +330,10 @@ def test_the_node_waits_for_joints_and_goes_without_an_action(monkeypatch: pytes
     assert stack.n_commands == 0 and not codes
     stack.joints_are_seen = True
     stack.send_until(lambda: any("goal" in told for told in stack.told))
+    assert [told["goal"]["reached"] for told in stack.told if "goal" in told] == [True]
     stack.interrupts = True
     node.join(timeout=20.0)
-    assert codes == [0] and stack.told[-1] != {} and "regrasp_msgs was not built" in capsys.readouterr().err
+    assert codes == [0] and "regrasp_msgs was not built" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(importlib.util.find_spec("rclpy") is not None, reason="ROS 2 is here")
