@@ -14,7 +14,8 @@ pytest.importorskip("mujoco")
 
 from regrasp.execute import Executor, ExecutorSettings, MujocoPlant, PlantSettings, turns  # noqa: E402
 from regrasp.execute.estimate import PoseFilter  # noqa: E402
-from regrasp.execute.goals import between  # noqa: E402
+from regrasp.execute.goals import between, towards  # noqa: E402
+from regrasp.execute.monitor import Monitor, Trigger  # noqa: E402
 from regrasp.execute.planning import ChargedPlanning, Ticket  # noqa: E402
 from regrasp.execute.settings import PLANNER, careful_settings  # noqa: E402
 from regrasp.simulate.reference import quat_exp, quat_product  # noqa: E402
@@ -124,3 +125,60 @@ def test_a_start_farther_off_is_good_enough_before_the_hand_gives_up(least: floa
     events = [event for event in log.events if event.kind == "no_start"]
     assert len(events) == 1 and len(strict.asked) > 3
     assert plant.touching() >= 2
+
+
+@pytest.mark.parametrize(("name", "regrips"), [("sphere_90x", True), ("sphere_90x", False), ("box_90x", True)])
+def test_where_a_leg_went_wrong_a_round_object_is_taken_hold_of_anew(
+    name: str, regrips: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = regrasp.load_scene(SCENES / f"{name}.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    goal = next(turns(plant.pose, count=1, seed=3, largest=0.5))
+    Told.tickets = []
+    careful = regrasp.Session(scene, settings=careful_settings(scene.objects[0])[-1])
+    settings = ExecutorSettings(regrips_round=regrips, anytime=False)
+    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, settings, planning=Told, careful=[careful])
+    look = Monitor.look
+
+    def slips_once(own: Monitor, k: int, senses: Any, targets: Any) -> Trigger | None:
+        found = look(own, k, senses, targets)
+        return Trigger("slip", "said by the test") if len(executor.log.legs) == 1 and k >= 40 else found
+
+    monkeypatch.setattr(Monitor, "look", slips_once)
+    log = executor.run([goal])
+    assert log.n_reached == 1 and log.events[0].message == "said by the test"
+    second = Told.tickets[1]
+    away = angle_between(second.start.world_from_object.quat_xyzw, second.goal.quat_xyzw)
+    if name == "sphere_90x" and regrips:
+        assert 0.0 < away < 0.01 and isinstance(second.answer, regrasp.Plan)
+        # A grasp that holds well is kept.
+        assert (log.plans[1] is second.answer) == (second.answer.statistics["relocations"] > 0)
+        assert Told.tickets[2].goal is goal
+    else:
+        assert second.goal is goal
+
+
+def test_where_a_grasp_is_weak_it_is_changed_while_the_object_hardly_moves() -> None:
+    scene = regrasp.load_scene(SCENES / "sphere_90x.toml")
+    plan = regrasp.plan(scene, seed=3)
+    assert isinstance(plan, regrasp.Plan)
+    session = regrasp.Session(scene, settings=careful_settings(scene.objects[0])[-1])
+    goal = regrasp.Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1])
+    found: set[bool] = set()
+    for index in range(0, len(plan.joints), 4):
+        start = session.project(regrasp.Pose(plan.object_positions[index], plan.object_quat_xyzw[index]), plan.joints[index])
+        if not isinstance(start, regrasp.Start):
+            continue
+        as_it_is = session.plan(start, start.world_from_object, seed=5)
+        anew = session.plan(start, towards(start.world_from_object, goal, 0.002), seed=5)
+        assert isinstance(as_it_is, regrasp.Plan) and isinstance(anew, regrasp.Plan)
+        is_weak = as_it_is.promises["kept_margin"] < 0.02
+        assert (anew.statistics["relocations"] > 0) == is_weak
+        found.add(is_weak)
+        if is_weak:
+            end = regrasp.Pose(anew.object_positions[-1], anew.object_quat_xyzw[-1])
+            ended = session.project(end, anew.joints[-1])
+            assert isinstance(ended, regrasp.Start)
+            held = session.plan(ended, ended.world_from_object, seed=5)
+            assert isinstance(held, regrasp.Plan) and held.promises["kept_margin"] > 0.019
+    assert found == {True, False}

@@ -16,27 +16,23 @@ from .._session import Session, Start
 from ..simulate.model import Rig, Settings
 from ..simulate.reference import Array
 from .endings import GiveUp, GoOn, Withdrawn
-from .goals import Upcoming, between
+from .goals import Upcoming, between, towards
 from .leg import Leg, first_rig
-from .log import Event, GoalResult, LegRecord, RunLog, Sample
+from .log import Event, GoalResult, LegRecord, RunLog
 from .monitor import HOLDING, Monitor, Trigger, pose_error, why_gone
 from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
-from .plant import Command, Plant
-from .senses import Fault, Senses
+from .plant import Plant
 from .sessions import ExecutorSessions
 from .settings import ROUND, ExecutorSettings
+from .steering import Steering
 
-#: A sample is kept every so many ticks.
-SAMPLED = 5
-#: Faults that stop the motion until they are over.
-SERIOUS = frozenset({"joints_missing", "stale_pose", "pose_jump"})
 #: Trouble that may pass while the hand holds: a push moves the object, and the fingers bring it back.
 PASSING = frozenset({"deviation", "lost_contact", "slip"})
-#: Events that a firmer grip may prevent.
-LOSING = frozenset({"deviation", "slip", "lost_contact", "missed"})
+#: The object turns by so much while it is taken hold of anew, in radians.
+REGRIP_TURN = 0.002
 
 
-class Executor:
+class Executor(Steering):
     """Brings the object of a session to goal after goal."""
 
     def __init__(
@@ -61,9 +57,9 @@ class Executor:
         others where ``grip`` says so. stiffness, damping: of the robot's joints, where they are not those of replays.
         listener: is told every event, and what became of every goal, as it happens, on the thread that runs.
         """
+        chosen = (settings or ExecutorSettings()).for_object(session.object)
+        super().__init__(plant, chosen, (stiffness, damping), listener, RunLog(scene=session.scene.name, settings=asdict(chosen)))
         self._session = session
-        self._plant = plant
-        self._settings = (settings or ExecutorSettings()).for_object(session.object)
         base = control or Settings(hold_time=0.0)
         self._control = Settings(
             controller="C2" if self._settings.feedback else "B",
@@ -73,31 +69,14 @@ class Executor:
             feedback_gain=base.feedback_gain,
             hold_time=0.0,
         )
-        self._gains = (stiffness, damping)
-        self._listener = listener
-        self._is_withdrawn: Callable[[], bool] | None = None
-        self._waits: Callable[[], None] | None = getattr(plant, "wait", None)
-        self._truth: Callable[[], tuple[Array, Array]] | None = getattr(plant, "truth", None)
         maker = planning or (ChargedPlanning if self._truth is not None else ThreadPlanning)
         self._planning = maker([*careful, session, *loose], self._settings, self._prepare)
         self._for_starts = [session, *loose]
         self._is_round = session.object.shape.kind in ROUND
         self._firm = firm
-        self._grips_firmer = self._settings.grip == "firm"
         self._rig: Rig | None = None
-        self._senses = Senses(len(plant.joint_names), self._settings)
-        self._leg: Leg | None = None
-        self._k = 0
         self._stopped: Monitor | None = None
-        self._servo: Array | None = None
-        self._blend_from: Array | None = None
-        self._blended = 1.0
-        self._last_command: Command | None = None
-        self._goal_index = 0
         self._n_queries = 0
-        self._n_ticks = 0
-        self._faults: dict[str, float] = {}
-        self.log = RunLog(scene=session.scene.name, settings=asdict(self._settings))
 
     @classmethod
     def of(cls, sessions: ExecutorSessions, plant: Plant, settings: ExecutorSettings | None = None, **more: Any) -> Executor:
@@ -198,6 +177,8 @@ class Executor:
                 why_not = f"{trigger.kind}: {trigger.message}"
                 ahead = None
                 self._event(trigger.kind, trigger.message, "replan" if attempt + 1 < settings.attempts else "hold")
+                if settings.regrips_round and self._is_round and trigger.kind in PASSING and attempt + 1 < settings.attempts:
+                    motion_time += self._regrip(goal)
                 continue
             is_reached, why_not = self._ends_at(goal, quat)
             if is_reached or not settings.replanning:
@@ -207,6 +188,25 @@ class Executor:
             self._event("missed", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
         self._result(goal, quat, is_reached, started, n_legs, motion_time, before, why_not)
         return ahead, quat
+
+    def _regrip(self, goal: Pose) -> float:
+        """Takes hold of the object anew, about where it is, if the present grasp is weak. How long the hand moved."""
+        try:
+            start = self._observed_start()
+        except GoOn:
+            return 0.0
+        # The planner looks at where a plan ends only if the object moves.
+        ticket = self._ask(start, towards(start.world_from_object, goal, REGRIP_TURN))
+        self._wait_for(ticket)
+        # Careful plans end in grasps that hold well; without a relocation this one does already.
+        if not isinstance(ticket.answer, Plan) or ticket.answer.statistics["relocations"] == 0:
+            return 0.0
+        self._begin(ticket, False)
+        begun = self._senses.time
+        trigger = self._run_leg()
+        if trigger is not None:
+            self._event(trigger.kind, trigger.message, "replan")
+        return self._senses.time - begun
 
     def _ends_at(self, goal: Pose, quat: Array) -> tuple[bool, str]:
         """Waits for feedback to bring the object to its goal. Whether it is there, and how far it is off."""
@@ -379,40 +379,6 @@ class Executor:
 
     # ---------------------------------------------------------------------------------------------------------------- motion
 
-    def _first_pose(self) -> None:
-        """Waits for the first pose and joints; the plant does what it did before."""
-        seen = self._plant.observe()
-        since = seen.time
-        self._take(seen)
-        while not (self._senses.knows_pose and self._senses.knows_joints):
-            if self._senses.time - since > self._settings.patience:
-                what = "no pose of the object" if not self._senses.knows_pose else "not every joint"
-                raise GiveUp("lost", f"{what} was ever seen")
-            self._wait()
-
-    def _wait(self) -> None:
-        """One tick before the first leg: without a command where the plant can wait, else with one that holds."""
-        if self._waits is not None:
-            self._waits()
-        else:
-            if self._last_command is None:
-                self._last_command = self._first_command()
-            self._plant.apply(self._last_command)
-        self._take(self._plant.observe())
-
-    def _first_command(self) -> Command:
-        """What the plant holds with as the run begins: what it says, what a simulation is told, else the joints where they are."""
-        holding: Command | None = getattr(self._plant, "holding", None)
-        if holding is not None:
-            return holding
-        stiffness, _ = self._gains
-        rig, data = getattr(self._plant, "rig", None), getattr(self._plant, "data", None)
-        if rig is not None and data is not None:
-            servo = np.array(data.ctrl[rig.motors])
-        else:
-            servo = self._senses.joints * (1.0 if stiffness is None else stiffness)
-        return Command(servo, self._senses.joints.copy(), np.zeros(len(servo)))
-
     def _begin(self, ticket: Ticket, was_prepared: bool) -> None:
         leg: Leg = ticket.prepared
         plan = leg.plan
@@ -485,116 +451,3 @@ class Executor:
             if senses.time - good_since >= settings.resume_after:
                 return True
         return False
-
-    def _outlast(self, faults: list[Fault]) -> None:
-        """Holds until observations are good again. Raises where they do not become so, and where the object is gone."""
-        settings, since = self._settings, self._senses.time
-        gone_since: float | None = None
-        while any(fault.kind in SERIOUS for fault in faults):
-            now, gone = self._senses.time, why_gone(self._leg, self._senses, self._settings)
-            gone_since = None if not gone else now if gone_since is None else gone_since
-            if gone_since is not None and now - gone_since >= settings.gone_after:
-                raise GiveUp("lost", gone)
-            if now - since > settings.patience:
-                raise GiveUp("gave_up", f"{faults[0].kind}: {faults[0].message}")
-            faults = self._tick(moves=False, state="hold")
-
-    def _settle(self, goal: Pose, quat: Array) -> tuple[float, float]:
-        """Waits for feedback to bring the object to its goal; how far it is off then."""
-        leg, settings = self._leg, self._settings
-        assert leg is not None
-        position = np.array(goal.position)
-        since = self._senses.time
-        while True:
-            distance, angle = pose_error(leg, self._senses.position, self._senses.quat, position, quat)
-            waited = self._senses.time - since
-            is_there = distance <= settings.settled_distance and angle <= settings.settled_turn
-            if (is_there and waited >= settings.settled_after) or waited >= settings.settle_time:
-                return distance, angle
-            self._tick(moves=False, state="settle")
-
-    def _hold_for(self, seconds: float) -> None:
-        """Holds, and for as long as observations are bad."""
-        since = self._senses.time
-        while self._senses.time - since < seconds:
-            faults = self._tick(moves=False, state="hold")
-            if faults:
-                self._outlast(faults)
-
-    # ----------------------------------------------------------------------------------------------------------------- ticks
-
-    def _tick(self, *, moves: bool, state: str, monitor: Monitor | None = None) -> list[Fault]:
-        """One command and what is seen after it; what is seriously wrong with that."""
-        leg = self._leg
-        if leg is None:
-            self._wait()
-        else:
-            servo = leg.command(self._k, self._senses.position, self._senses.quat, moves=moves)
-            if self._blended < 1.0 and self._blend_from is not None:
-                self._blended = min(1.0, self._blended + self._plant.tick / self._settings.blend_time)
-                servo = self._blend_from + self._blended * (servo - self._blend_from)
-            else:
-                self._blended = 1.0
-            self._last_command = leg.as_command(self._k, servo, moves=moves)
-            self._plant.apply(self._last_command)
-            self._take(self._plant.observe())
-        self._n_ticks += 1
-        if self._n_ticks % SAMPLED == 0 and state != "idle":
-            self._sample(state, monitor)
-        if self._is_withdrawn is not None and self._is_withdrawn():
-            raise Withdrawn
-        return self._current
-
-    def _resting(self) -> Command:
-        assert self._last_command is not None
-        if self._leg is None:
-            return self._last_command
-        servo = self._leg.command(self._k, self._senses.position, self._senses.quat, moves=False)
-        return self._leg.as_command(self._k, servo, moves=False)
-
-    def _take(self, seen: Any) -> None:
-        leg = self._leg
-        faults = self._senses.take(seen, leg, self._k)
-        now = self._senses.time
-        for fault in faults:
-            # A fault that stays is told once a second.
-            if now - self._faults.get(fault.kind, -np.inf) > 1.0:
-                self._faults[fault.kind] = now
-                self._event(fault.kind, fault.message, "hold" if fault.kind in SERIOUS else "ignore")
-        self._current = [fault for fault in faults if fault.kind in SERIOUS]
-
-    def _sample(self, state: str, monitor: Monitor | None) -> None:
-        leg, senses = self._leg, self._senses
-        if leg is None:
-            return
-        wanted = leg.ref.object_position[self._k], leg.ref.object_quat_wxyz[self._k]
-        distance, angle = pose_error(leg, senses.position, senses.quat, *wanted)
-        true_distance = true_angle = None
-        if self._truth is not None:
-            true_distance, true_angle = pose_error(leg, *self._truth(), *wanted)
-        self.log.samples.append(
-            Sample(
-                time=round(senses.time, 6),
-                leg=len(self.log.legs) - 1,
-                tick=self._k,
-                state=state,
-                distance=distance,
-                angle=angle,
-                true_distance=true_distance,
-                true_angle=true_angle,
-                slip=0.0 if monitor is None else monitor.slip,
-                forces=None if senses.forces is None else [float(force) for force in senses.forces],
-                joint_error=0.0 if monitor is None else monitor.joint_error,
-            )
-        )
-
-    def _event(self, kind: str, message: str, answer: str) -> None:
-        leg = len(self.log.legs) - 1
-        if kind in LOSING and self._settings.grip == "firm after trouble":
-            self._grips_firmer = True
-        self._tell(Event(round(self._senses.time, 6), kind, message, answer, self._goal_index, leg))
-
-    def _tell(self, happening: Event | GoalResult) -> None:
-        self.log.add(happening)
-        if self._listener is not None:
-            self._listener(happening)

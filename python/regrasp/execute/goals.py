@@ -33,6 +33,12 @@ def between(start: Pose, goal: Pose, share: float) -> Pose:
     return Pose((1.0 - share) * np.array(start.position) + share * np.array(goal.position), turned[[1, 2, 3, 0]])
 
 
+def towards(start: Pose, goal: Pose, turn: float) -> Pose:
+    """The pose on the way from ``start`` to ``goal`` at which the object has turned by so much, in radians; no farther than the goal."""
+    whole = 2.0 * float(np.arccos(min(1.0, abs(float(np.dot(start.quat_xyzw, goal.quat_xyzw))))))
+    return between(start, goal, min(1.0, turn / max(whole, 1e-12)))
+
+
 class Upcoming:
     """The goals of an iterable, with a look ahead. An iterable that has no goal for now yields ``None``, and is asked again."""
 

@@ -149,6 +149,9 @@ class ExecutorSettings:
     """The same for spheres and ellipsoids, where that is less. By measurement: a sphere came to rest a few degrees beyond its goal, and every
     new leg pushed it as far beyond on the other side. Against that these two help, together with the usual grip, which legs after a miss
     have (docs/benchmarks/execute.md). On other shapes the share was not measured, and slow legs did harm where fingers relocate."""
+    regrips_round: bool = True
+    """Where a leg of a sphere or ellipsoid went wrong on its way, the hand first takes hold of it anew, where it is, if the grasp that is left is
+    weak: else the next leg begins with that, and slips sooner."""
     plan_attempts: int = 3
     """Seeds that are tried for one leg."""
     choices: int = 20
