@@ -111,8 +111,7 @@ class Executor(Steering):
                 except Withdrawn:
                     prepared, quat = None, np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
                     self._event("withdrawn", "the goal is not wanted any more", "hold")
-                    n_legs = sum(leg.goal == self._goal_index for leg in log.legs)
-                    self._result(goal, quat, False, started, n_legs, 0.0, before, "withdrawn")
+                    self._result(goal, quat, False, started, 0.0, before, "withdrawn")
                     before = self._senses.quat
                 self._is_withdrawn = None
                 self._goal_index += 1
@@ -135,7 +134,7 @@ class Executor(Steering):
     ) -> tuple[Ticket | None, Array]:
         """To one goal; what was planned for the one after, and this goal's orientation."""
         settings = self._settings
-        started, motion_time, n_legs, why_not = self._senses.time, 0.0, 0, ""
+        started, motion_time, why_not = self._senses.time, 0.0, ""
         quat = np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
         is_reached = has_missed = False
         ahead: Ticket | None = None
@@ -164,7 +163,6 @@ class Executor(Steering):
                         why_not = "no plan from where the object is"
                         self._event("no_plan", why_not, "replan")
                         continue
-                n_legs += 1
                 self._begin(ticket, was_prepared)
                 ahead = None
                 following = upcoming.peek() if settings.anytime and not (settings.replanning and attempt > 0) else None
@@ -186,7 +184,7 @@ class Executor(Steering):
             ahead = None
             has_missed = True
             self._event("missed", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
-        self._result(goal, quat, is_reached, started, n_legs, motion_time, before, why_not)
+        self._result(goal, quat, is_reached, started, motion_time, before, why_not)
         return ahead, quat
 
     def _regrip(self, goal: Pose) -> float:
@@ -215,7 +213,7 @@ class Executor(Steering):
         return is_reached, "" if is_reached else f"ended {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees off"
 
     def _result(
-        self, goal: Pose, quat: Array, is_reached: bool, started: float, n_legs: int, motion: float, before: Array, why_not: str
+        self, goal: Pose, quat: Array, is_reached: bool, started: float, motion: float, before: Array, why_not: str
     ) -> None:
         position = np.array(goal.position)
         distance = angle = float("inf")
@@ -232,7 +230,7 @@ class Executor(Steering):
                 reached=is_reached,
                 start_time=started,
                 time=self._senses.time,
-                legs=n_legs,
+                legs=sum(leg.goal == self._goal_index for leg in self.log.legs),
                 motion_time=motion,
                 turn=4.0 * float(np.arcsin(min(1.0, 0.5 * apart))),
                 distance=min(distance, 1e9),
