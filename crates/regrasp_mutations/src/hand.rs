@@ -9,6 +9,7 @@ use regrasp_plan::check::violation::ViolationKind::{
 };
 use regrasp_plan::plan::{SegmentKind, Waypoint};
 use regrasp_robot::ContactModel;
+use regrasp_robot::JointKind;
 use regrasp_robot::tip::Pad;
 use std::sync::Arc;
 
@@ -79,8 +80,8 @@ impl Breeder<'_> {
         self.add_hand("coupling left out", &[ContactOffTip], |hand, rng| {
             let joint = *coupled.get(rng.below(coupled.len().max(1)))?;
             let joint = &mut Arc::make_mut(&mut hand.robot).joints[joint];
-            // What follows nothing and is driven by nothing rests.
-            joint.coupling = None;
+            // It rests. A joint that moves and belongs to no finger would be one that the plan has to name.
+            (joint.coupling, joint.kind) = (None, JointKind::Fixed);
             is_held.then_some(())
         });
         let (model, robot) = (self.model, &self.task.hand().robot);
