@@ -94,18 +94,19 @@ class RosPlant:
         self._due = self._clock.now()
 
     def on_joint_states(self, message: Any) -> None:
-        """Of ``sensor_msgs/JointState``: joints that are no joints of the hand are passed over. Joints may come in several messages, with
-        velocities or without: then they are what the position has changed since."""
-        known = {name: index for index, name in enumerate(message.name)}
-        has_velocities = len(message.velocity) == len(message.name)
+        """Of ``sensor_msgs/JointState``: joints that are no joints of the hand are passed over, and positions that are no numbers. Joints may
+        come in several messages, and without velocities: then those are what the position has changed since."""
+        known = {name: float(position) for name, position in zip(message.name, message.position)}
+        velocities = {name: float(velocity) for name, velocity in zip(message.name, message.velocity)}
         now = self._clock.now()
         with self._lock:
             for index, name in enumerate(self.joint_names):
-                if name not in known:
+                position, velocity = known.get(name, np.nan), velocities.get(name, np.nan)
+                if not np.isfinite(position):
                     continue
-                position, since = float(message.position[known[name]]), now - self._heard[index]
-                if has_velocities:
-                    self._velocities[index] = float(message.velocity[known[name]])
+                since = now - self._heard[index]
+                if np.isfinite(velocity):
+                    self._velocities[index] = velocity
                 elif 0.0 < since <= self._stale_after:
                     self._velocities[index] = (position - self._joints[index]) / since
                 else:
@@ -176,7 +177,6 @@ class Goals:
         self._n_given = 0
         """Of these, so many were given to the executor."""
         self._closed = False
-        self._message = ""
 
     def on_goal(self, message: Any) -> Asked | None:
         """Of ``geometry_msgs/PoseStamped``. None where that is no pose, or nobody takes goals any more."""

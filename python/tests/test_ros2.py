@@ -69,6 +69,10 @@ def test_messages_become_observations() -> None:
     seen = plant.observe()
     assert seen.joints.tolist() == [1.0, 2.0] and seen.pose_stamp == pytest.approx(99.5) and seen.time == 100.0
     assert seen.object_position is not None and seen.object_position.tolist() == [1.0, 2.0, 3.0]
+    # Messages of efforts alone, and numbers that are none, say nothing of where a joint is.
+    plant.on_joint_states(SimpleNamespace(name=["a", "b"], position=[], velocity=[]))
+    plant.on_joint_states(joint_states(["a", "b"], [np.nan, 2.0], [1.0, np.nan]))
+    assert plant.newest()[0].tolist() == [1.0, 2.0] and plant.newest()[1].tolist() == [0.0, 0.0]
     # What is not heard of any more is missing: it is not made up.
     clock.time += 0.15
     plant.on_joint_states(joint_states(["a"], [1.5]))

@@ -8,9 +8,8 @@ use regrasp_plan::check::violation::ViolationKind::{
     ClosureLost, ContactOffPad, ContactOffTip, JointLimit, WrongScene,
 };
 use regrasp_plan::plan::{SegmentKind, Waypoint};
-use regrasp_robot::ContactModel;
-use regrasp_robot::JointKind;
 use regrasp_robot::tip::Pad;
+use regrasp_robot::{ContactModel, JointKind};
 use std::sync::Arc;
 
 impl Breeder<'_> {
