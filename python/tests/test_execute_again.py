@@ -119,8 +119,8 @@ def test_a_start_farther_off_is_good_enough_before_the_hand_gives_up(least: floa
     settings = ExecutorSettings(anytime=False)
     log = Executor(strict, plant, settings).run(turns(plant.pose, count=1, seed=3))
     assert log.status == status, log.message
-    usual, wide = (settings.project_distance, settings.project_turn), (0.004, 0.08)
-    assert set(strict.asked) == {usual, wide} and strict.asked == sorted(strict.asked), strict.asked
+    usual, turned, wide = (settings.project_distance, settings.project_turn), (settings.project_distance, 0.08), (0.004, 0.08)
+    assert set(strict.asked) == {usual, turned, wide} and strict.asked == sorted(strict.asked), strict.asked
     # The usual limits are asked again and again, for as long as the hand is patient.
     events = [event for event in log.events if event.kind == "no_start"]
     assert len(events) == 1 and len(strict.asked) > 3
@@ -135,7 +135,7 @@ def test_where_a_leg_went_wrong_a_round_object_is_taken_hold_of_anew(
     plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
     goal = next(turns(plant.pose, count=1, seed=3, largest=0.5))
     Told.tickets = []
-    careful = regrasp.Session(scene, settings=careful_settings(scene.objects[0])[-1])
+    careful = regrasp.Session(scene, settings=careful_settings(scene.objects[0])[1])
     settings = ExecutorSettings(regrips_round=regrips, anytime=False)
     executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, settings, planning=Told, careful=[careful])
     look = Monitor.look
@@ -162,7 +162,7 @@ def test_where_a_grasp_is_weak_it_is_changed_while_the_object_hardly_moves() -> 
     scene = regrasp.load_scene(SCENES / "sphere_90x.toml")
     plan = regrasp.plan(scene, seed=3)
     assert isinstance(plan, regrasp.Plan)
-    session = regrasp.Session(scene, settings=careful_settings(scene.objects[0])[-1])
+    session = regrasp.Session(scene, settings=careful_settings(scene.objects[0])[1])
     goal = regrasp.Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1])
     found: set[bool] = set()
     for index in range(0, len(plan.joints), 4):
@@ -182,3 +182,88 @@ def test_where_a_grasp_is_weak_it_is_changed_while_the_object_hardly_moves() -> 
             held = session.plan(ended, ended.world_from_object, seed=5)
             assert isinstance(held, regrasp.Plan) and held.promises["kept_margin"] > 0.019
     assert found == {True, False}
+
+
+class Barren:
+    """A session that has no start, or no plan, while ``is_barren``."""
+
+    def __init__(self, session: regrasp.Session, of: str) -> None:
+        self._session, self._of, self.is_barren = session, of, False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._session, name)
+
+    def project(self, *args: Any, **more: Any) -> Any:
+        far = regrasp.Pose(np.array([0.0, 0.0, 9.0]), np.array([0.0, 0.0, 0.0, 1.0]))
+        rest = (far, *args[1:]) if self.is_barren and self._of == "start" else args
+        return self._session.project(*rest, **more)
+
+    def plan(self, start: regrasp.Start, goal: regrasp.Pose, **more: Any) -> Any:
+        # From the hand's own base: no search finds that.
+        buried = regrasp.Pose(np.zeros(3), goal.quat_xyzw)
+        return self._session.plan(start, buried if self.is_barren and self._of == "plan" else goal, **more)
+
+
+@pytest.mark.parametrize("of", ["start", "plan"])
+def test_a_leg_goes_on_where_nothing_else_is_left_and_the_object_is_on_its_way(of: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = regrasp.load_scene(SCENES / "box_90x.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    goal = next(turns(plant.pose, count=1, seed=3, largest=0.5))
+    barren: Any = Barren(regrasp.Session(scene, settings=PLANNER), of)
+    executor = Executor(barren, plant, ExecutorSettings(anytime=False, patience=0.5))
+    look = Monitor.look
+    slips: list[int] = []
+
+    def slips_thrice(own: Monitor, k: int, senses: Any, targets: Any) -> Trigger | None:
+        found = look(own, k, senses, targets)
+        if len(slips) < 3 and k >= 15 * (1 + len(slips)):
+            slips.append(k)
+            # From the first slip on there is nothing.
+            barren.is_barren = True
+            return Trigger("slip", "said by the test")
+        return found
+
+    monkeypatch.setattr(Monitor, "look", slips_thrice)
+    monkeypatch.setattr(Monitor, "is_sudden", property(lambda _: False))
+    monkeypatch.setattr(Executor, "_comes_back", lambda *_: False)
+    log = executor.run([goal])
+    # One plan, stopped three times, led all the way there.
+    assert len(slips) == 3 and len(log.plans) == 1 and log.n_reached == 1, log.message
+    resumed = [event.kind for event in log.events if event.answer == "resume"]
+    assert resumed == [f"no_{of}"] * 3
+
+
+def test_a_leg_that_went_on_often_enough_does_not_go_on_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = regrasp.load_scene(SCENES / "box_90x.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    goal = next(turns(plant.pose, count=1, seed=3, largest=0.5))
+    barren: Any = Barren(regrasp.Session(scene, settings=PLANNER), "start")
+    executor = Executor(barren, plant, ExecutorSettings(anytime=False, patience=0.3, most_resumes=2))
+
+    def always_slips(own: Monitor, k: int, senses: Any, targets: Any) -> Trigger | None:
+        barren.is_barren = True
+        return Trigger("slip", "said by the test")
+
+    monkeypatch.setattr(Monitor, "look", always_slips)
+    monkeypatch.setattr(Executor, "_comes_back", lambda *_: False)
+    log = executor.run([goal])
+    assert log.status == "gave_up" and len([event for event in log.events if event.answer == "resume"]) == 2
+    assert plant.touching() >= 2
+
+
+def test_where_no_plan_is_found_the_hand_takes_hold_anew() -> None:
+    scene = regrasp.load_scene(SCENES / "box_90x.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=2)
+    goal = next(turns(plant.pose, count=1, seed=3, largest=0.5))
+    barren: Any = Barren(regrasp.Session(scene, settings=PLANNER), "plan")
+    barren.is_barren = True
+    Told.tickets = []
+    anew = regrasp.Session(scene, settings={**PLANNER, "end_margin": 0.05})
+    executor = Executor(barren, plant, ExecutorSettings(anytime=False, attempts=2), planning=Told, anew=[anew])
+    log = executor.run([goal])
+    assert log.status == "done" and log.n_reached == 0
+    asked = [angle_between(ticket.start.world_from_object.quat_xyzw, ticket.goal.quat_xyzw) for ticket in Told.tickets]
+    assert len(asked) == 3 and asked[1] < 0.01 < min(asked[0], asked[2]), asked
+    # The box is held better after it.
+    (leg,) = log.plans
+    assert leg is Told.tickets[1].answer and leg.statistics["relocations"] > 0

@@ -14,7 +14,20 @@ import pytest
 import regrasp
 from regrasp.execute.planning import ChargedPlanning
 from regrasp.execute.sessions import ExecutorSessions, planner_settings
-from regrasp.execute.settings import CAREFUL, CAREFUL_ROUND, CLEAR_ROUND, MESH_TIPS, PLANNER, ExecutorSettings, work_share
+from regrasp.execute.settings import (
+    ANEW,
+    CAREFUL,
+    CAREFUL_ROUND,
+    CLEAR_ROUND,
+    EDGED,
+    FIRM,
+    FIRM_ROUND,
+    LOOSE,
+    MESH_TIPS,
+    PLANNER,
+    ExecutorSettings,
+    work_share,
+)
 
 ROOT = Path(__file__).parents[2]
 MODELS = Path(os.environ.get("REGRASP_MODELS", ROOT.parent / "shared/models"))
@@ -62,28 +75,32 @@ def test_hands_with_mesh_tips_get_an_eighth_of_the_work_for_more_plans() -> None
         assert ticket.ready_at == pytest.approx(7.0 + charged)
 
 
-@pytest.mark.parametrize(("name", "careful"), [("box_90x", (CAREFUL,)), ("sphere_90x", (CLEAR_ROUND, CAREFUL_ROUND))])
+@pytest.mark.parametrize(("name", "careful"), [("box_90x", (CAREFUL, EDGED)), ("sphere_90x", (CLEAR_ROUND, CAREFUL_ROUND, FIRM_ROUND))])
 def test_sessions_of_a_scene_have_the_settings_of_execution(name: str, careful: tuple[dict[str, Any], ...]) -> None:
     scene = regrasp.load_scene(ROOT / f"scenes/{name}.toml")
     sessions = ExecutorSessions.of(scene)
     plan = regrasp.plan(scene, seed=1)
     assert isinstance(plan, regrasp.Plan)
     assert len(sessions.careful) == len(careful)
-    for session, least in zip((sessions.usual, *sessions.careful), (PLANNER, *careful)):
+    others = [(sessions.usual, PLANNER), (sessions.loose, LOOSE), (sessions.firm, FIRM), (sessions.anew, ANEW)]
+    for session, least in [*zip(sessions.careful, careful), *others]:
         start = session.project(regrasp.Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1]), plan.joints[-1])
         assert start
         back = regrasp.Pose(plan.object_positions[0], plan.object_quat_xyzw[0])
         found = session.plan(start, back, seed=3, max_work=200_000)
         assert isinstance(found, regrasp.Plan), found
-        assert found.settings["improve_work"] == least["improve_work"]
+        for key in ("improve_work", "shorten_relocation", "search_work"):
+            assert found.settings[key] == least[key]
         assert found.settings["friction_margin"] == least.get("friction_margin", 1.5)
         assert found.settings["clearance"] == least.get("clearance", 0.0002)
+        assert found.settings["edge_margin"] == least.get("edge_margin", 0.0)
+        assert found.settings["closure_margin"] == least.get("closure_margin", 0.005)
         assert found.settings["end_margin"] == least.get("end_margin", 0.0)
         assert found.settings["forces"]["squeeze"] == least.get("forces", {"squeeze": 4.0})["squeeze"]
 
 
 def test_only_the_work_for_better_plans_is_shared() -> None:
-    assert planner_settings(CAREFUL, 0.125) == {**CAREFUL, "improve_work": 7500}
+    assert planner_settings(CAREFUL, 0.125) == {**CAREFUL, "improve_work": 7500, "shorten_relocation": 2500}
 
 
 @needs_models

@@ -8,6 +8,7 @@ use crate::settings::{PhysicsSettings, TransferMode};
 use arrayvec::ArrayVec;
 use regrasp_geometry::collision::{Ball, BallTree, MeshBody, MeshTree, Placement};
 use regrasp_geometry::mass::solid_properties;
+use regrasp_geometry::surface::SurfacePoint;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_grasp::{Contact, ContactModel, GraspFrame, Grip, closure};
 use regrasp_robot::kinematics::body_frame::BodyFrame;
@@ -152,6 +153,25 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
+    /// True where a contact that is chosen may lie: off the edges, by the margin of the settings too.
+    pub fn keeps_off_edges(&self, at: &SurfacePoint) -> bool {
+        let object = self.view.object;
+        object.keeps_off_edges(at)
+            && (self.settings.edge_margin <= 0.0
+                || object.edge_distance <= 0.0
+                || object.surface.crease_distance(at) >= object.edge_distance + self.settings.edge_margin)
+    }
+
+    /// True where a contact at `from` may roll to `to`: off the edges, and nearer to them than the margin allows only where it goes away.
+    pub fn may_roll(&self, from: &Contact, to: &SurfacePoint) -> bool {
+        if self.keeps_off_edges(to) {
+            return true;
+        }
+        let object = self.view.object;
+        let distance = |at: &SurfacePoint| object.surface.crease_distance(at);
+        object.keeps_off_edges(to) && distance(to) >= distance(&object.surface.project(&from.point_in_object))
+    }
+
     /// Prepares `view`; the scene's limits bound the settings.
     pub fn new(view: &'a HandView<'a>, settings: &PhysicsSettings) -> Self {
         let settings = settings.within(&view.limits);

@@ -126,7 +126,9 @@ impl Session {
             let settings = settings_for(IN_HAND, settings, &asked).map_err(|wrong| {
                 error::argument(py, "Session", "settings", format!("{wrong:?}"), "keys as \"settings\" in a plan file")
             })?;
-            let mut session = Session { scene, task, settings: settings.in_hand, roadmap: None };
+            // A session is asked again and again: nobody waits for what would have helped.
+            let settings = regrasp::InHandSettings { advise: false, ..settings.in_hand };
+            let mut session = Session { scene, task, settings, roadmap: None };
             let agreed = py.detach(|| {
                 let opened = session.opened()?;
                 roadmap.map(|path| opened.agreed_roadmap(&path, GraspRoadmap::read(&path)?)).transpose()

@@ -16,4 +16,9 @@ class Withdrawn(Exception):
 
 
 class GoOn(Exception):
-    """There is no start here, and the leg that was stopped may go on."""
+    """There is no start here, or no plan from here, and the leg that was stopped may go on."""
+
+    def __init__(self, kind: str, message: str) -> None:
+        super().__init__(message)
+        self.kind = kind
+        """The event: ``no_start`` or ``no_plan``."""

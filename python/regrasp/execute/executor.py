@@ -46,6 +46,7 @@ class Executor(Steering):
         careful: Sequence[Session] = (),
         loose: Sequence[Session] = (),
         firm: Sequence[Session] = (),
+        anew: Sequence[Session] = (),
         stiffness: Array | None = None,
         damping: Array | None = None,
         listener: Callable[[Event | GoalResult], None] | None = None,
@@ -53,8 +54,10 @@ class Executor(Steering):
         """session, plant: of the same hand. control: as the replay's settings, of which tick and speed count.
 
         planning: ``ThreadPlanning`` for robots; where nothing is said, ``ChargedPlanning`` for plants that know the truth, which are
-        simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first; loose: that are asked last, and for starts that the session refuses; firm: that are asked before all
-        others where ``grip`` says so. stiffness, damping: of the robot's joints, where they are not those of replays.
+        simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first; loose: that are asked
+        last, and for starts that the session refuses; firm: that are asked before all others where ``grip`` says so; anew: of plans that
+        end in grasps that hold well, asked where no plan leads on. stiffness, damping: of the robot's joints, where they are not those of
+        replays.
         listener: is told every event, and what became of every goal, as it happens, on the thread that runs.
         """
         chosen = (settings or ExecutorSettings()).for_object(session.object)
@@ -74,14 +77,19 @@ class Executor(Steering):
         self._for_starts = [session, *loose]
         self._is_round = session.object.shape.kind in ROUND
         self._firm = firm
+        self._anew = anew
         self._rig: Rig | None = None
         self._stopped: Monitor | None = None
+        """Of the leg, where that was stopped on its way."""
+        self._is_trusted = False
+        """True where it was stopped for the first time."""
+        self._times_gone_on = 0
         self._n_queries = 0
 
     @classmethod
     def of(cls, sessions: ExecutorSessions, plant: Plant, settings: ExecutorSettings | None = None, **more: Any) -> Executor:
         """With all sessions of a scene. more: as of `Executor`."""
-        all_of_it: dict[str, Any] = {"careful": sessions.careful, "loose": [sessions.loose], "firm": [sessions.firm], **more}
+        all_of_it: dict[str, Any] = {"careful": sessions.careful, "loose": [sessions.loose], "firm": [sessions.firm], "anew": [sessions.anew], **more}
         return cls(sessions.usual, plant, settings, **all_of_it)
 
     # ------------------------------------------------------------------------------------------------------------- whole runs
@@ -138,44 +146,36 @@ class Executor(Steering):
         quat = np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
         is_reached = has_missed = False
         ahead: Ticket | None = None
-        # A leg to another goal does not go on.
-        self._stopped = None
-        for attempt in range(settings.attempts if settings.replanning else 1):
-            ticket, was_prepared = prepared, prepared is not None
-            prepared = None
-            if ticket is None:
-                try:
-                    ticket = self._query(goal, is_again=attempt > 0, has_missed=has_missed)
-                except GoOn as cause:
-                    self._event("no_start", str(cause), "resume")
-            if ticket is not None:
-                self._wait_for(ticket)
+        # A leg to another goal does not go on, unless nothing else is left.
+        self._is_trusted = False
+        attempt, most = 0, settings.attempts if settings.replanning else 1
+        while attempt < most:
+            answer = "replan" if attempt + 1 < most else "hold"
+            made_ahead, prepared = prepared, None
+            try:
+                ticket = self._leg_to(goal, made_ahead, is_again=attempt > 0, has_missed=has_missed)
+            except GoOn as cause:
+                self._times_gone_on += 1
+                self._event(cause.kind, str(cause), "resume")
+            else:
+                attempt += 1
                 if not isinstance(ticket.answer, Plan):
-                    why_not = f"no plan: {ticket.answer.message if isinstance(ticket.answer, Failure) else 'cancelled'}"
-                    self._event("no_plan", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
+                    why_not = _no_plan(ticket)
+                    self._event("no_plan", why_not, answer)
+                    if self._anew and settings.replanning and attempt < most:
+                        motion_time += self._regrip(goal, self._anew)
                     continue
-                if was_prepared and self._is_off_start(ticket):
-                    # Too far from where the plan begins: it is made anew, from here.
-                    ticket = self._query(goal)
-                    was_prepared = False
-                    self._wait_for(ticket)
-                    if not isinstance(ticket.answer, Plan):
-                        why_not = "no plan from where the object is"
-                        self._event("no_plan", why_not, "replan")
-                        continue
-                self._begin(ticket, was_prepared)
-                ahead = None
-                following = upcoming.peek() if settings.anytime and not (settings.replanning and attempt > 0) else None
-                if following is not None:
-                    ahead = self._ask_ahead(ticket.answer, following)
+                self._begin(ticket, ticket is made_ahead)
+                following = upcoming.peek() if settings.anytime and not (settings.replanning and attempt > 1) else None
+                ahead = None if following is None else self._ask_ahead(ticket.answer, following)
             begun = self._senses.time
             trigger = self._run_leg()
             motion_time += self._senses.time - begun
             if trigger is not None:
                 why_not = f"{trigger.kind}: {trigger.message}"
                 ahead = None
-                self._event(trigger.kind, trigger.message, "replan" if attempt + 1 < settings.attempts else "hold")
-                if settings.regrips_round and self._is_round and trigger.kind in PASSING and attempt + 1 < settings.attempts:
+                self._event(trigger.kind, trigger.message, answer)
+                if settings.regrips_round and self._is_round and trigger.kind in PASSING and attempt < most:
                     motion_time += self._regrip(goal)
                 continue
             is_reached, why_not = self._ends_at(goal, quat)
@@ -183,20 +183,34 @@ class Executor(Steering):
                 break
             ahead = None
             has_missed = True
-            self._event("missed", why_not, "replan" if attempt + 1 < settings.attempts else "hold")
+            self._event("missed", why_not, answer)
         self._result(goal, quat, is_reached, started, motion_time, before, why_not)
         return ahead, quat
 
-    def _regrip(self, goal: Pose) -> float:
-        """Takes hold of the object anew, about where it is, if the present grasp is weak. How long the hand moved."""
+    def _leg_to(self, goal: Pose, prepared: Ticket | None, *, is_again: bool, has_missed: bool) -> Ticket:
+        """The answer to where to go next: what was planned ahead, else a query from where the object is. Raises `GoOn` where the leg that
+        was stopped is the best that there is."""
+        ticket = prepared if prepared is not None else self._query(goal, is_again=is_again, has_missed=has_missed)
+        self._wait_for(ticket)
+        if prepared is not None and isinstance(ticket.answer, Plan) and self._is_off_start(ticket):
+            # Too far from where the plan begins: it is made anew, from here.
+            ticket = self._query(goal)
+            self._wait_for(ticket)
+        if not isinstance(ticket.answer, Plan) and self._may_go_on():
+            raise GoOn("no_plan", _no_plan(ticket))
+        return ticket
+
+    def _regrip(self, goal: Pose, first: Sequence[Session] = ()) -> float:
+        """Takes hold of the object anew, about where it is, if the present grasp is weak: by a plan of ``first``, or of careful sessions,
+        which end in grasps that hold well where the object is round. How long the hand moved."""
         try:
             start = self._observed_start()
         except GoOn:
             return 0.0
         # The planner looks at where a plan ends only if the object moves.
-        ticket = self._ask(start, towards(start.world_from_object, goal, REGRIP_TURN))
+        ticket = self._ask(start, towards(start.world_from_object, goal, REGRIP_TURN), first)
         self._wait_for(ticket)
-        # Careful plans end in grasps that hold well; without a relocation this one does already.
+        # Without a relocation the grasp holds well already.
         if not isinstance(ticket.answer, Plan) or ticket.answer.statistics["relocations"] == 0:
             return 0.0
         self._begin(ticket, False)
@@ -292,11 +306,14 @@ class Executor(Steering):
             if not told:
                 self._event("no_start", message, "hold")
                 told = True
-            if self._may_go_on():
-                raise GoOn(message)
+            if self._is_trusted and self._may_go_on():
+                raise GoOn("no_start", message)
             if self._go_back() or senses.time - since <= settings.patience:
                 continue
             if reach >= settings.last_reach:
+                # The object is where the leg has it, and held: going on does less harm than ending here.
+                if self._may_go_on():
+                    raise GoOn("no_start", message)
                 n_felt = None if senses.forces is None else int((senses.forces > settings.lost_force).sum())
                 lost = "no finger touches" in message if n_felt is None else n_felt < HOLDING
                 raise GiveUp("lost" if lost else "gave_up", f"no start: {message}")
@@ -308,20 +325,24 @@ class Executor(Steering):
         settings, senses = self._settings, self._senses
         pose = Pose(senses.position.copy(), senses.quat[[1, 2, 3, 0]].copy())
         presses = None if senses.forces is None else (senses.forces > settings.lost_force).tolist()
-        distance, turn = reach * settings.project_distance, reach * settings.project_turn
         message = ""
-        for session in self._for_starts:
-            start = session.project(pose, senses.joints, presses=presses, distance=distance, turn=turn)
-            if isinstance(start, Start):
-                return start, ""
-            # The last session accepts most: its cause is what is left.
-            message = start.message
+        # Angles first: with more distance, fingers that are farther away count as touching too.
+        for share in (1.0,) if reach == 1.0 else (1.0, reach):
+            distance, turn = share * settings.project_distance, reach * settings.project_turn
+            for session in self._for_starts:
+                start = session.project(pose, senses.joints, presses=presses, distance=distance, turn=turn)
+                if isinstance(start, Start):
+                    return start, ""
+                # The last session accepts most: its cause is what is left.
+                message = start.message
         return None, message
 
     def _may_go_on(self) -> bool:
-        """True where a leg was stopped on its way, once, and all but slipped fingertips are where that leg has them."""
+        """True where a leg was stopped on its way, and all but slipped fingertips are where that leg has them."""
         monitor = self._stopped
-        return monitor is not None and monitor.is_back(self._k, self._senses, 1.0, slips=False)
+        if monitor is None or self._times_gone_on >= self._settings.most_resumes:
+            return False
+        return monitor.is_back(self._k, self._senses, 1.0, slips=False)
 
     def _go_back(self) -> bool:
         """Goes back on the leg for ``back_off_time``, no farther than to where another finger landed or lifted. False where that is
@@ -383,7 +404,7 @@ class Executor(Steering):
         offsets = None
         if was_prepared and self._leg is not None and self._leg.feedback is not None:
             offsets = self._leg.feedback.offsets.copy()
-        self._leg, self._k = leg, 0
+        self._leg, self._k, self._times_gone_on = leg, 0, 0
         if offsets is not None and leg.feedback is not None:
             leg.feedback.carry(offsets)
         self._blend_from = None if self._last_command is None else self._last_command.servo.copy()
@@ -425,7 +446,7 @@ class Executor(Steering):
                 may_pass = may_pass and (trigger.kind != "deviation" or monitor.is_sudden)
                 if not (may_pass and self._comes_back(monitor)):
                     # A leg that goes wrong again after it went on is not to be trusted.
-                    self._stopped = monitor if first == 0 else None
+                    self._stopped, self._is_trusted = monitor, first == 0
                     return trigger
                 resumed += 1
                 self._event(trigger.kind, trigger.message, "resume")
@@ -449,3 +470,7 @@ class Executor(Steering):
             if senses.time - good_since >= settings.resume_after:
                 return True
         return False
+
+
+def _no_plan(ticket: Ticket) -> str:
+    return f"no plan: {ticket.answer.message if isinstance(ticket.answer, Failure) else 'cancelled'}"

@@ -82,9 +82,8 @@ class Monitor:
         return bool(self._shares) and self._shares[0][1] <= self._settings.resume_share
 
     def is_back(self, k: int, senses: Senses, share: float, *, slips: bool = True) -> bool:
-        """True where the leg may go on: the object is within ``share`` of what counts as a deviation, every joint near where it was
-        told to be, every holding finger feels the object, and, with ``slips``, no fingertip is beyond ``share`` of what counts as a
-        slip."""
+        """True where the leg may go on: the object is within ``share`` of what counts as a deviation, every joint within ``share`` of what
+        counts as stalled, every holding finger feels the object, and, with ``slips``, no fingertip is beyond ``share`` of a slip."""
         leg, settings = self._leg, self._settings
         wanted = leg.ref.object_position[k], leg.ref.object_quat_wxyz[k]
         distance, angle = pose_error(leg, senses.position, senses.quat, *wanted)
@@ -92,7 +91,7 @@ class Monitor:
         return bool(
             distance <= share * settings.deviation_distance
             and angle <= share * settings.deviation_turn
-            and (error <= settings.resume_share * settings.stall_error + self._usual_error).all()
+            and (error <= share * settings.stall_error + self._usual_error).all()
             and (senses.forces is None or (senses.forces >= settings.lost_force)[leg.ref.holds[k]].all())
             and not (slips and settings.slip_trigger and self.slip > share * settings.slip_distance)
         )

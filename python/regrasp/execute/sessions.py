@@ -8,7 +8,7 @@ from typing import Any
 
 from .._model import Scene
 from .._session import Session
-from .settings import FIRM, LOOSE, PLANNER, careful_settings, work_share
+from .settings import ANEW, FIRM, LOOSE, PLANNER, careful_settings, work_share
 
 
 @dataclass(frozen=True)
@@ -17,11 +17,13 @@ class ExecutorSessions:
 
     usual: Session
     careful: tuple[Session, ...]
-    """More room for friction that is lower than thought; the first of them keeps links farther away where the object is round."""
+    """Those of `careful_settings`."""
     loose: Session
     """For starts that are worse than plans may be."""
     firm: Session
     """A firmer grip."""
+    anew: Session
+    """Of grasps that hold well, where no plan leads on from the present one."""
 
     @classmethod
     def of(cls, scene: Scene) -> ExecutorSessions:
@@ -32,10 +34,10 @@ class ExecutorSessions:
         def opened(kind: Mapping[str, Any]) -> Session:
             return Session(scene, settings=planner_settings(kind, work_share(hand)))
 
-        return cls(opened(PLANNER), tuple(opened(kind) for kind in careful_settings(moved)), opened(LOOSE), opened(FIRM))
+        return cls(opened(PLANNER), tuple(opened(kind) for kind in careful_settings(moved)), opened(LOOSE), opened(FIRM), opened(ANEW))
 
 
 def planner_settings(settings: Mapping[str, Any], share: float) -> dict[str, Any]:
     """The same with so much of the work for better plans. Plans that the planner calls long are shortened with 20,000 configurations all
     the same."""
-    return {**settings, "improve_work": round(share * settings["improve_work"])}
+    return {**settings, **{key: round(share * settings[key]) for key in ("improve_work", "shorten_relocation")}}

@@ -10,27 +10,39 @@ import numpy as np
 from .._model import Hand, Object
 
 #: Settings of the planner that execution plans with, where nothing else is said: the speed that scenes allow by default, and short ramps.
-#: Every plan is improved a little, by weights that are about the time that the motions take: at 0.1 m/s a relocation is worth 12 cm.
+#: Every plan is improved a little, and the more the more relocations it has, by weights that are about the time that the motions take: at
+#: 0.1 m/s a relocation is worth 12 cm. A search for a first plan ends after ``search_work``: most that find one have found it by then
+#: (docs/benchmarks/execute.md, "Time of a leg").
 PLANNER: dict[str, Any] = {
     "speed": {"largest_speed": 0.1, "ramp": 0.06},
+    "search_work": 400_000,
     "improve_work": 60_000,
+    "shorten_relocation": 20_000,
     "cost": {"relocation": 1.0, "object_path": 8.0, "joint_path": 0.05, "margin": 0.05},
 }
-#: The same with more room for friction that is lower than thought. Plans are sought with these first.
-CAREFUL: dict[str, Any] = {**PLANNER, "friction_margin": 2.0}
+#: The same for objects with edges: fingertips never land quite where they should, and links stray. The grip is firmer: with friction 0.7
+#: of the scene's, 62 of 80 goals of a cube in the Allegro hand where 4 N had 36 (docs/benchmarks/execute.md).
+EDGED: dict[str, Any] = {**PLANNER, "clearance": 0.0006, "edge_margin": 0.002, "forces": {"squeeze": 6.0}}
+#: The same with more room for friction that is lower than thought. Plans are sought with these first: of 60 queries of that cube 23 have
+#: such a plan, 22 of them within this work.
+CAREFUL: dict[str, Any] = {**EDGED, "friction_margin": 2.0, "search_work": 300_000}
 #: These instead of ``CAREFUL`` for spheres and ellipsoids, which are soon squeezed out of the hand where fingertips slip. The grip is
 #: firmer: a fingertip that is not quite where it should be pushes along the surface, and slips less the more it presses. And the next
 #: plan begins with the grasp that one ends with, so that must hold well. By measurement with friction 0.7 of the scene's:
 #: docs/benchmarks/execute.md. A cube in the Allegro hand was given up or dropped with these.
-CAREFUL_ROUND: dict[str, Any] = {**CAREFUL, "forces": {"squeeze": 6.0}, "end_margin": 0.02}
+CAREFUL_ROUND: dict[str, Any] = {**PLANNER, "friction_margin": 2.0, "forces": {"squeeze": 6.0}, "end_margin": 0.02}
 #: These before ``CAREFUL_ROUND``: links keep farther away. A fingertip may touch a sphere beside the link that carries it. Where the sphere is
 #: a little off, that link presses in place of the tip, and no start is found any more. The wide hand's links stand back 1 mm behind their
 #: fingertips: in two runs with much trouble (friction 0.7) 8 of 80 legs had no plan with 0.6 mm.
 CLEAR_ROUND: dict[str, Any] = {**CAREFUL_ROUND, "clearance": 0.0006}
+#: These after them: the usual plans, but the grip stays as firm. Where it loosened as such a leg began, spheres fell.
+FIRM_ROUND: dict[str, Any] = {**PLANNER, "forces": {"squeeze": 6.0}}
 #: The same for starts that are worse than plans may be: links may be nearer to what they must not touch, grasps may hold less.
 LOOSE: dict[str, Any] = {**PLANNER, "clearance": 2e-5, "closure_margin": 0.001}
 #: The same with a firmer grip: legs are planned with these first where ``grip`` says so. Origin: pushes of 4 N on the bundled box.
-FIRM: dict[str, Any] = {**CAREFUL, "forces": {"squeeze": 12.0, "normal_force": [2.0, 30.0]}}
+FIRM: dict[str, Any] = {**PLANNER, "friction_margin": 2.0, "forces": {"squeeze": 12.0, "normal_force": [2.0, 30.0]}}
+#: Plans that end in a grasp that holds well: the hand takes hold of the object anew, where no plan leads on from the present grasp.
+ANEW: dict[str, Any] = {**PLANNER, "end_margin": 0.03}
 
 #: Shapes that are round everywhere.
 ROUND = frozenset({"sphere", "ellipsoid"})
@@ -47,7 +59,7 @@ def work_share(hand: Hand) -> float:
 
 def careful_settings(moved: Object) -> tuple[dict[str, Any], ...]:
     """The settings with which plans for this object are sought first, in order."""
-    return (CLEAR_ROUND, CAREFUL_ROUND) if moved.shape.kind in ROUND else (CAREFUL,)
+    return (CLEAR_ROUND, CAREFUL_ROUND, FIRM_ROUND) if moved.shape.kind in ROUND else (CAREFUL, EDGED)
 
 
 @dataclass(frozen=True)
@@ -159,8 +171,8 @@ class ExecutorSettings:
     choice_work: int = 250_000
     """Another one is made only while all of a leg are likely to stay below this work, in configurations; in hands whose fingertips are
     meshes below an eighth of it (``work_share``)."""
-    max_work: int = 400_000
-    """Work of one search, in configurations."""
+    max_work: int = 1_000_000
+    """Work of one search and of what makes its plan better, in configurations."""
     time_limit: float | None = None
     """Wall-clock limit of one search, in seconds; with one, runs depend on the machine."""
     work_rate: float = 300_000.0

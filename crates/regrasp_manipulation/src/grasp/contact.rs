@@ -66,7 +66,7 @@ fn draw_contact_once(
         return None;
     }
     let hit = object.surface.settle_counted(&hit, finger_model.settle_radius, n_measured)?;
-    if !object.keeps_off_edges(&hit) {
+    if !model.keeps_off_edges(&hit) {
         return None;
     }
     Some(Contact { point_in_object: hit.point_in_object, normal_in_object: hit.normal_in_object })
@@ -119,7 +119,7 @@ pub fn draw_contact_by_area(
             continue;
         }
         let settled = object.surface.settle_counted(&drawn, finger_model.settle_radius, &mut n_measured);
-        if let Some(settled) = settled.filter(|settled| object.keeps_off_edges(settled)) {
+        if let Some(settled) = settled.filter(|settled| workspace.model.keeps_off_edges(settled)) {
             let (point_in_object, normal_in_object) = (settled.point_in_object, settled.normal_in_object);
             found = Some(Contact { point_in_object, normal_in_object });
             break;

@@ -122,10 +122,9 @@ fn nearest(
 
 /// The contact of a tip that touches, if it may touch there: away from creases, with its pad, and nowhere else.
 pub fn contact(model: &Model, finger: usize, hand_from_object: &Pose, joints: &[f64], gap: &Gap) -> Option<Contact> {
-    let object = model.view.object;
     let normal = UnitVector::new_normalize(gap.normal);
     let may = gap.is_exact
-        && object.surface.crease_distance(&gap.at) >= object.edge_distance
+        && model.keeps_off_edges(&gap.at)
         && model.fingers[finger].pad_faces(joints, &(hand_from_object * normal.into_inner()));
     may.then_some(Contact { point_in_object: gap.at.point_in_object, normal_in_object: normal })
 }

@@ -72,9 +72,9 @@ pub struct Rolled {
 }
 
 impl Rolled {
-    /// True where the contact keeps the distance from edges that the scene asks for.
-    pub fn keeps_off_edges(&self, model: &Model) -> bool {
-        model.view.object.keeps_off_edges(&self.foot)
+    /// True where the contact keeps off edges after a roll from `before`, as [`Model::may_roll`] says.
+    pub fn keeps_off_edges(&self, model: &Model, before: &Contact) -> bool {
+        model.may_roll(before, &self.foot)
     }
 }
 

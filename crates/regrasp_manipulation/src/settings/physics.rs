@@ -32,6 +32,10 @@ pub struct PhysicsSettings {
     pub step: f64,
     /// Smallest distance between bodies that must not touch, in metres. By hand.
     pub clearance: f64,
+    /// How much farther contacts keep from edges than the object's `edge_distance`, in metres: fingertips never land quite where they
+    /// should. Contacts nearer than that, as starts may have, may roll away from the edge. No part of objects whose contacts may lie on
+    /// edges.
+    pub edge_margin: f64,
     /// How far the tip link of a holding finger may press into the object in the model, in metres. By hand: well below
     /// the contact tolerance of 0.5 mm.
     pub contact_allowance: f64,
@@ -57,6 +61,7 @@ impl Default for PhysicsSettings {
             closure_margin: 0.005,
             step: 0.003,
             clearance: 0.0002,
+            edge_margin: 0.0,
             contact_allowance: 0.0003,
             limit_margin: 0.01,
             joint_step: 0.4,

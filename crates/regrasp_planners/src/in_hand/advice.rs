@@ -2,7 +2,7 @@
 
 use crate::in_hand::attempt::tally::OFTEN;
 use crate::in_hand::{Asked, plan_with};
-use crate::settings::{InHandSettings, Method, SearchSettings};
+use crate::settings::{ImprovementSettings, InHandSettings, Method, SearchSettings};
 use regrasp_base::Budget;
 use regrasp_geometry::collision::Placement;
 use regrasp_geometry::{Pose, Vector};
@@ -49,7 +49,7 @@ pub fn advise(
     let work = (failure.statistics.work / SHARE).clamp(WORK[0], WORK[1]);
     let search = SearchSettings { first_try: None, shortcuts: 0, ..settings.search.clone() };
     let mut short = InHandSettings { search, n_threads: 1, ..settings.clone() };
-    (short.improvement.improve_work, short.improvement.shorten_share) = (0, 0.0);
+    short.improvement = ImprovementSettings::none();
     // Who gave a time limit does not wait much longer; configurations alone cost 10,000 times 0.35 ms in the LEAP hand with a scan.
     let deadline = budget.deadline.map(|_| Instant::now() + searched.mul_f64(TIME_SHARE));
     let limits = Budget { max_work: work, deadline, ..budget.clone() };

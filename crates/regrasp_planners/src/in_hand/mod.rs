@@ -106,7 +106,8 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
     let mut spent = 0;
     let mut missed = Vec::new();
     let gives_start = asked.query.start_grasp != GraspRequest::Automatic;
-    for (first, work) in first_try::first_tries(asked.view, settings, budget, gives_start) {
+    let search_work = settings.search.search_work.map_or(budget.max_work, |most| most.min(budget.max_work));
+    for (first, work) in first_try::first_tries(asked.view, settings, search_work, gives_start) {
         let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
         match plan_with(asked, &first, &left, work) {
             Ok(mut plan) => {
@@ -121,7 +122,7 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
         }
     }
     let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
-    let mut found = plan_with(asked, settings, &left, left.max_work);
+    let mut found = plan_with(asked, settings, &left, search_work.saturating_sub(spent));
     let (Ok(Plan { statistics, .. }) | Err(Failure { statistics, .. })) = &mut found;
     statistics.work += spent;
     if let Err(failure) = &mut found {
@@ -264,7 +265,7 @@ fn with_better_end(context: Context, legs: &Legs, query: &InHandQuery, solution:
 /// Work after which a long plan is left as it is where nobody asks for a better one; 0 for plans that are not long. A plan that ends
 /// stuck, in a grasp in which no finger may lift, counts as long.
 fn shortening_work(model: &Model, settings: &InHandSettings, (legs, is_stuck): (&Legs, bool), plan: &Plan) -> u64 {
-    let ImprovementSettings { long_plan, shorten_share, .. } = settings.improvement;
+    let ImprovementSettings { long_plan, shorten_share, shorten_relocation, .. } = settings.improvement;
     let restricts = (0..model.n_fingers()).any(|finger| model.restricts_motion(finger));
     // A plan that begins with a given grasp pays for it: it seldom is one with which the object can be turned far.
     let long_plan = if legs.start_grasp.is_some() { LONG_FROM_GIVEN.min(long_plan) } else { long_plan };
@@ -272,8 +273,12 @@ fn shortening_work(model: &Model, settings: &InHandSettings, (legs, is_stuck): (
     if settings.method != Method::Gait || !model.any_rolls() || restricts || !is_long {
         return 0;
     }
+    if shorten_share == 0.0 {
+        return 0;
+    }
     let share = (plan.statistics.work as f64 * shorten_share) as u64;
-    if shorten_share > 0.0 { share.max(LEAST_SHORTENING) } else { 0 }
+    let per_relocation = if legs.start_grasp.is_some() { shorten_relocation } else { 0 };
+    share.max(LEAST_SHORTENING).max(per_relocation.saturating_mul(plan.n_relocations()))
 }
 
 /// Relocations from which on a plan that begins with a given grasp is long.

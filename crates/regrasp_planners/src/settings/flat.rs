@@ -44,6 +44,7 @@ flat! {
         closure_margin: f64,
         step: f64,
         clearance: f64,
+        edge_margin: f64,
         first_try: Option<FirstTry>,
         contact_allowance: f64,
         limit_margin: f64,
@@ -64,11 +65,13 @@ flat! {
         free_after: u32,
         free_share: f64,
         restart_work: u64,
+        search_work: Option<u64>,
         courses_work: u64,
         shortcuts: usize,
         improve_work: u64,
         long_plan: u64,
         shorten_share: f64,
+        shorten_relocation: u64,
         end_margin: f64,
         cost: CostWeights,
         forces: Option<ForceSettings>,
@@ -79,16 +82,16 @@ flat! {
         finger_ways: FingerWays,
     }
     physics: PhysicsSettings {
-        transfer, friction_margin, closure_margin, step, clearance, contact_allowance, limit_margin, joint_step, lift_heights, rrt_iterations, forces, speed,
+        transfer, friction_margin, closure_margin, step, clearance, edge_margin, contact_allowance, limit_margin, joint_step, lift_heights, rrt_iterations, forces, speed,
     }
     search: SearchSettings {
-        release_rule, first_try, wander_distance, wander_angle, far_share, passage_share, goal_share, try_fee, aimless_share, candidates, candidates_kept, least_holding, transfers_alone, free_after, free_share, restart_work, courses_work, shortcuts,
+        release_rule, first_try, wander_distance, wander_angle, far_share, passage_share, goal_share, try_fee, aimless_share, candidates, candidates_kept, least_holding, transfers_alone, free_after, free_share, restart_work, search_work, courses_work, shortcuts,
     }
     baselines: BaselineSettings {
         alpha, guided_share, edge_crossings, finger_ways,
     }
     improvement: ImprovementSettings {
-        improve_work, long_plan, shorten_share, end_margin, cost,
+        improve_work, long_plan, shorten_share, shorten_relocation, end_margin, cost,
     }
 }
 

@@ -111,6 +111,7 @@ impl InHandSettings {
         for (name, value) in [
             ("closure_margin", self.physics.closure_margin),
             ("first_try.closure_margin", self.search.first_try.map_or(0.0, |first| first.closure_margin)),
+            ("edge_margin", self.physics.edge_margin),
             ("contact_allowance", self.physics.contact_allowance),
             ("limit_margin", self.physics.limit_margin),
             ("far_share", self.search.far_share),

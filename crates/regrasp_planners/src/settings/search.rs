@@ -112,6 +112,9 @@ pub struct SearchSettings {
     /// seeds: against 300,000 a million saves 30 % on allegro/box_x and about a tenth on cube45_x and cube57_x, and
     /// costs a quarter on cylinder20_x.
     pub restart_work: u64,
+    /// Work after which a search that has no plan yet ends; `null` for all that is allowed. What is allowed beyond that is for better
+    /// plans.
+    pub search_work: Option<u64>,
     /// Work spent on gaits along straight and bent courses after a short look by trees, where the query gives the start grasp
     /// and fingertips roll; first tries then have at most twice as much. 0 for neither. By measurement on chains of goals
     /// with the cube in the Allegro hand, 90 queries and 600,000 configurations: 71 are solved with and without, in 1.8 s instead
@@ -140,6 +143,7 @@ impl Default for SearchSettings {
             free_after: 3,
             free_share: 0.5,
             restart_work: 1_000_000,
+            search_work: None,
             courses_work: 15_000,
             shortcuts: 8,
         }

@@ -8,8 +8,8 @@ use regrasp_plan::check::closure::{HeldBody, margin};
 use regrasp_plan::check::{CheckSettings, Level};
 use regrasp_plan::plan::{Improvement, Waypoint};
 use regrasp_plan::{Plan, SegmentKind};
-use regrasp_planners::in_hand::ImprovementSettings;
 use regrasp_planners::in_hand::{CostWeights, InHandSettings, Method, plan_in_hand, validate_once};
+use regrasp_planners::in_hand::{ImprovementSettings, SearchSettings};
 use regrasp_scene::{GraspRequest, InHandQuery, LoadedScene};
 use std::time::Duration;
 
@@ -314,4 +314,72 @@ fn plans_end_with_the_margin_that_is_asked_for_and_given_grasps_stay() {
         assert_eq!(there.segments.last().unwrap().waypoints.last().unwrap().joints, last, "not one bit off");
     }
     assert!(n_weak >= 4 && 2 * n_better >= n_weak, "{n_better} of {n_weak}");
+}
+
+/// The way back of a plan, from the grasp in which it ends.
+fn way_back(query: &InHandQuery, plan: &Plan) -> InHandQuery {
+    let end = plan.segments.last().unwrap().waypoints.last().unwrap();
+    InHandQuery {
+        world_from_object_start: Pose::from(&end.world_from_object),
+        world_from_object_goal: query.world_from_object_start,
+        start_grasp: GraspRequest::Joints(end.joints.clone()),
+        ..query.clone()
+    }
+}
+
+#[test]
+fn plans_from_a_given_grasp_are_shortened_by_their_relocations() {
+    let loaded = scene("box_180z.toml");
+    let budget = Budget::work(20_000_000);
+    let asked = |shorten_relocation| InHandSettings {
+        improvement: ImprovementSettings { shorten_relocation, ..ImprovementSettings::default() },
+        ..InHandSettings::default()
+    };
+    let find = |query: &InHandQuery, settings: &InHandSettings, seed| {
+        let plan = plan_in_hand(&loaded.view(), query, settings, seed, &budget, &|_| {}).unwrap();
+        let report = loaded.judge(query, &plan, &CheckSettings::default());
+        assert!(report.accepted(), "seed {seed}: {:#?}", report.violations);
+        plan
+    };
+    let (mut before, mut after) = (0, 0);
+    for seed in 0..6 {
+        let query = loaded.in_hand(seed);
+        let there = find(&query, &asked(0), seed);
+        assert!(there.segments == find(&query, &asked(10_000), seed).segments, "its start grasp is not given");
+        let back = way_back(&query, &there);
+        let (usual, shorter) = (find(&back, &asked(0), seed), find(&back, &asked(10_000), seed));
+        let (told, first) = (improvement(&shorter), improvement(&usual).first.relocations);
+        assert_eq!(told.first.relocations, first, "the same plan is shortened");
+        assert!(told.work >= 10_000 * first, "{} for {first} relocations", told.work);
+        before += usual.n_relocations();
+        after += shorter.n_relocations();
+    }
+    assert!(after < before, "{before} relocations, then {after}");
+}
+
+#[test]
+fn a_search_ends_without_a_plan_where_its_own_work_is_spent_and_better_plans_have_the_rest() {
+    let budget = Budget::work(400_000);
+    let asked = |search_work| InHandSettings {
+        advise: false,
+        search: SearchSettings { search_work, ..SearchSettings::default() },
+        ..settings_of_execution()
+    };
+    let hopeless = scene("out_of_reach.toml");
+    for (search_work, spent) in [(None, 400_000), (Some(30_000), 30_000)] {
+        let failure = plan_in_hand(&hopeless.view(), &hopeless.in_hand(0), &asked(search_work), 0, &budget, &|_| {});
+        let work = failure.unwrap_err().statistics.work;
+        assert!((spent..spent + 5_000).contains(&work), "{work} where {search_work:?} are allowed");
+    }
+    let loaded = scene("box_90x.toml");
+    let query = loaded.in_hand(3);
+    let plan = plan_in_hand(&loaded.view(), &query, &asked(Some(30_000)), 3, &budget, &|_| {}).unwrap();
+    assert!(loaded.judge(&query, &plan, &CheckSettings::default()).accepted());
+    assert!(plan.statistics.work >= 100_000, "{}", plan.statistics.work);
+}
+
+/// Every plan is made better with 100,000 configurations.
+fn settings_of_execution() -> InHandSettings {
+    let improvement = ImprovementSettings { improve_work: 100_000, ..ImprovementSettings::default() };
+    InHandSettings { improvement, ..InHandSettings::default() }
 }

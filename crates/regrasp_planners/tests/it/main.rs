@@ -5,6 +5,7 @@ mod advice;
 mod carried;
 mod closing_fingers;
 mod contact_kinematics;
+mod edge_margin;
 mod folds;
 mod free_fingers;
 mod improvement;

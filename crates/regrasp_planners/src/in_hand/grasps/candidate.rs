@@ -77,7 +77,7 @@ pub fn follow_share(
         let next = if model.rolls(finger) {
             let step = RollStep::new(model, finger, &contact, &current, from, world_from_object);
             let Some(rolled) = step.coarse(LOOK_AHEAD_STEP) else { break };
-            if !rolled.keeps_off_edges(model) {
+            if !rolled.keeps_off_edges(model, &contact) {
                 break;
             }
             contact = rolled.contact;

@@ -216,7 +216,7 @@ fn step(
         let step = RollStep::new(model, finger, contact, joints, &course.placements[moment], placement);
         let rolled = step.fine(|t| Placement::from(&line.at(t)), HALFWAY_ALLOWED).ok()?;
         let halfway = rolled.halfway.unwrap_or(rolled.contact);
-        let keeps_off = rolled.keeps_off_edges(model);
+        let keeps_off = rolled.keeps_off_edges(model, contact);
         return keeps_off.then_some(TrackStep { joints: rolled.joints, contact: rolled.contact, halfway });
     }
     let there = follow_contact(model, finger, contact, placement, joints)?;

@@ -215,7 +215,7 @@ impl Way {
                 Some(path) => {
                     let (t, _) = way.place(t);
                     let settled = object.surface.settle(&path.at(&object.surface, t)?, finger.settle_radius)?;
-                    object.keeps_off_edges(&settled).then_some(Contact {
+                    model.keeps_off_edges(&settled).then_some(Contact {
                         point_in_object: settled.point_in_object,
                         normal_in_object: settled.normal_in_object,
                     })
@@ -235,7 +235,7 @@ fn jumps_of(model: &Model, finger: usize, path: &ContactPath) -> Vec<Jump> {
     let holds = |t: f64| {
         let at = path.at(&object.surface, t);
         let settled = at.and_then(|at| object.surface.settle(&at, model.fingers[finger].settle_radius));
-        settled.is_some_and(|settled| object.keeps_off_edges(&settled))
+        settled.is_some_and(|settled| model.keeps_off_edges(&settled))
     };
     let mut jumps: Vec<Jump> = Vec::new();
     let (mut last, mut is_jumping) = (0.0, false);

@@ -43,7 +43,7 @@ pub fn step_joints(model: &Model, holding: u32, here: &Moment, pose: &Pose) -> R
         } else if model.rolls(finger) {
             let rolled =
                 RollStep::new(model, finger, &contacts[finger], own, &from, &to).fine(between, HALFWAY_ALLOWED)?;
-            if !rolled.keeps_off_edges(model) {
+            if !rolled.keeps_off_edges(model, &contacts[finger]) {
                 return Err(NoStep::OutOfReach);
             }
             if model.restricts_motion(finger) {

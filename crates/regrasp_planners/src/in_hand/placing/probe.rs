@@ -1,7 +1,7 @@
 //! Short searches from a pose: what a search with little work finds, one with more finds often.
 
 use crate::in_hand::{Asked, plan_with};
-use crate::settings::{InHandSettings, SearchSettings};
+use crate::settings::{ImprovementSettings, InHandSettings, SearchSettings};
 use regrasp_base::Budget;
 use regrasp_geometry::Pose;
 use regrasp_geometry::frame::pose_distance;
@@ -70,7 +70,7 @@ pub fn probe(
 ) -> Result<Vec<Probe>, Failure> {
     let search = SearchSettings { first_try: None, shortcuts: 0, ..settings.search.clone() };
     let mut short = InHandSettings { search, n_threads: 1, ..settings.clone() };
-    (short.improvement.improve_work, short.improvement.shorten_share) = (0, 0.0);
+    short.improvement = ImprovementSettings::none();
     let silent = |_: Progress| {};
     let mut probes = Vec::with_capacity(queries.len());
     for query in queries {

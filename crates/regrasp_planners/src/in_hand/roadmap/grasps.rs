@@ -54,7 +54,7 @@ fn draw(model: &Model, finger: usize, rng: &mut Rng) -> Option<Contact> {
     let object = &model.view.object;
     let drawn = object.surface.sample(rng);
     let settled = object.surface.settle(&drawn, model.fingers[finger].settle_radius)?;
-    object
+    model
         .keeps_off_edges(&settled)
         .then_some(Contact { point_in_object: settled.point_in_object, normal_in_object: settled.normal_in_object })
 }

@@ -258,7 +258,7 @@ impl GraspRoadmap {
 }
 
 /// The settings that decide what is feasible, by name.
-fn feasibility(settings: &InHandSettings) -> [(&'static str, serde_json::Value); 8] {
+fn feasibility(settings: &InHandSettings) -> [(&'static str, serde_json::Value); 9] {
     use serde_json::json;
     [
         ("closure_margin", json!(settings.physics.closure_margin)),
@@ -266,6 +266,7 @@ fn feasibility(settings: &InHandSettings) -> [(&'static str, serde_json::Value);
         ("release_rule", json!(settings.search.release_rule)),
         ("step", json!(settings.physics.step)),
         ("clearance", json!(settings.physics.clearance)),
+        ("edge_margin", json!(settings.physics.edge_margin)),
         ("contact_allowance", json!(settings.physics.contact_allowance)),
         ("limit_margin", json!(settings.physics.limit_margin)),
         ("joint_step", json!(settings.physics.joint_step)),

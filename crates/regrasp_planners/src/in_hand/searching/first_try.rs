@@ -3,7 +3,6 @@
 
 use super::attempts::{MOVE_THE_START, allow_more, within};
 use crate::settings::{InHandSettings, Method, SearchSettings};
-use regrasp_base::Budget;
 use regrasp_geometry::collision::support::support_value;
 use regrasp_geometry::{Vector, frame};
 use regrasp_manipulation::failure::Failure;
@@ -24,14 +23,14 @@ const LONGER_WITH_MANY: u64 = 4;
 /// Fingers up to which they are not many.
 const FEW_FINGERS: usize = 4;
 
-/// Settings and work of what is tried first, in order; none where there is nothing to try: more clearance and more closure, and
+/// Settings and work of what is tried first, in order, of `search_work` in all; none where there is nothing to try: more clearance and more closure, and
 /// more clearance alone.
 ///
 /// Where the query gives the start grasp (`gives_start`) they have no more work than twice that of a look along courses.
 pub fn first_tries(
     view: &HandView,
     settings: &InHandSettings,
-    budget: &Budget,
+    search_work: u64,
     gives_start: bool,
 ) -> Vec<(InHandSettings, u64)> {
     let Some(wanted) = settings.search.first_try.filter(|_| settings.method == Method::Gait) else { return Vec::new() };
@@ -46,7 +45,7 @@ pub fn first_tries(
     let with = |keeps_away: bool, closes_more: bool| {
         let clearance = if keeps_away { wanted.clearance } else { settings.physics.clearance };
         let closure_margin = if closes_more { wanted.closure_margin } else { settings.physics.closure_margin };
-        let work = most_work.min(budget.max_work / 4);
+        let work = most_work.min(search_work / 4);
         let physics = PhysicsSettings { clearance, closure_margin, ..settings.physics.clone() };
         let search = SearchSettings { first_try: None, ..settings.search.clone() };
         (InHandSettings { physics, search, ..settings.clone() }, work)
@@ -130,7 +129,7 @@ mod tests {
         let with = |wanted: FirstTry| {
             let search = SearchSettings { first_try: Some(wanted), ..SearchSettings::default() };
             let settings = InHandSettings { search, ..InHandSettings::default() };
-            first_tries(&view, &settings, &Budget::work(1000), false)
+            first_tries(&view, &settings, 1000, false)
         };
         let (usual, wanted) = (InHandSettings::default(), FirstTry::default());
         assert!(with(FirstTry { closure_margin: 0.0, ..wanted }).is_empty());
@@ -144,7 +143,7 @@ mod tests {
         assert_eq!(asked(&with(wanted)), [(usual.physics.clearance, wanted.closure_margin, 250)]);
         let search = SearchSettings { first_try: Some(wanted), courses_work: 70, ..SearchSettings::default() };
         let hurried = InHandSettings { search, ..InHandSettings::default() };
-        let with_start = first_tries(&view, &hurried, &Budget::work(1_000_000), true);
+        let with_start = first_tries(&view, &hurried, 1_000_000, true);
         assert_eq!(asked(&with_start), [(usual.physics.clearance, wanted.closure_margin, 140)]);
         let nearer = FirstTry { clearance: 0.0005, work: 90, ..wanted };
         let both = [(0.0005, wanted.closure_margin, 90), (0.0005, usual.physics.closure_margin, 90)];
@@ -173,7 +172,7 @@ mod tests {
                     elements: vec![],
                 };
             }
-            let tries = first_tries(&loaded.view(), &InHandSettings::default(), &Budget::work(10_000_000), false);
+            let tries = first_tries(&loaded.view(), &InHandSettings::default(), 10_000_000, false);
             assert!(!tries.is_empty());
             tries.into_iter().map(|(_, work)| work).collect()
         };
@@ -187,7 +186,7 @@ mod tests {
         let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
         let tries = |scene: &str| -> Vec<u64> {
             let loaded = regrasp_scene::load_scene(&scenes.join(scene), &LoadOptions::default()).unwrap();
-            let tries = first_tries(&loaded.view(), &InHandSettings::default(), &Budget::work(10_000_000), false);
+            let tries = first_tries(&loaded.view(), &InHandSettings::default(), 10_000_000, false);
             tries.into_iter().map(|(_, work)| work).collect()
         };
         let of_four = tries("box_90x.toml");

@@ -181,7 +181,7 @@ fn shifted(model: &Model, near: &GraspState, numbers: &DVector<f64>) -> Option<G
         let (x, y) = tangents(&normal_in_object);
         let shift: Vector = x.into_inner() * numbers[2 * finger] + y.into_inner() * numbers[2 * finger + 1];
         let foot = object.surface.project(&(point_in_object + shift));
-        if !object.keeps_off_edges(&foot) {
+        if !model.keeps_off_edges(&foot) {
             return None;
         }
         let contact = Contact { point_in_object: foot.point_in_object, normal_in_object: foot.normal_in_object };
