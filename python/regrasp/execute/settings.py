@@ -11,8 +11,8 @@ from .._model import Hand, Object
 
 #: Settings of the planner that execution plans with, where nothing else is said: the speed that scenes allow by default, and short ramps.
 #: Every plan is improved a little, and the more the more relocations it has, by weights that are about the time that the motions take: at
-#: 0.1 m/s a relocation is worth 12 cm. A search for a first plan ends after ``search_work``: most that find one have found it by then
-#: (docs/benchmarks/execute.md, "Time of a leg").
+#: 0.1 m/s a relocation is worth 12 cm. A search for a first plan ends after ``search_work``: of 60 queries of a cube in the Allegro
+#: hand 48 have a plan by then, and 51 after twice as much.
 PLANNER: dict[str, Any] = {
     "speed": {"largest_speed": 0.1, "ramp": 0.06},
     "search_work": 400_000,
