@@ -33,8 +33,7 @@ pub struct PhysicsSettings {
     /// Smallest distance between bodies that must not touch, in metres. By hand.
     pub clearance: f64,
     /// How much farther contacts keep from edges than the object's `edge_distance`, in metres: fingertips never land quite where they
-    /// should. Contacts nearer than that, as starts may have, may roll away from the edge. No part of objects whose contacts may lie on
-    /// edges.
+    /// should. Contacts of a given start that are nearer may only roll away from the edge. Without effect where `edge_distance` is 0.
     pub edge_margin: f64,
     /// How far the tip link of a holding finger may press into the object in the model, in metres. By hand: well below
     /// the contact tolerance of 0.5 mm.

@@ -55,7 +55,7 @@ use regrasp_manipulation::model::Model;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_scene::{GraspRequest, HandView, InHandQuery};
-use searching::attempts::{Left, run_attempts};
+use searching::attempts::{ALLOW_MORE_SEARCH, Left, allow_more, run_attempts};
 use searching::first_try;
 use searching::legs::{Legs, Solution, plan_legs};
 use std::sync::atomic::AtomicUsize;
@@ -127,6 +127,9 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
     statistics.work += spent;
     if let Err(failure) = &mut found {
         first_try::tell(failure, missed);
+        if failure.kind == FailureKind::WorkSpent && search_work < budget.max_work {
+            failure.advice = failure.advice.replacen(allow_more(failure.kind), ALLOW_MORE_SEARCH, 1);
+        }
         let model = Model::new(asked.view, &effective(settings).within(&asked.view.limits).physics);
         let ends = [&asked.query.world_from_object_start, &asked.query.world_from_object_goal];
         friction::advise(&model, ends, asked.seed, failure);

@@ -129,6 +129,9 @@ impl InHandSettings {
         if !(self.physics.friction_margin >= 1.0 && self.physics.friction_margin <= 100.0) {
             return Err(format!("friction_margin is {}; it must be between 1 and 100", self.physics.friction_margin));
         }
+        if self.search.search_work == Some(0) {
+            return Err("search_work is 0; it must be at least 1, or null".into());
+        }
         if self.n_threads == 0
             || self.search.candidates == 0
             || self.search.candidates_kept == 0

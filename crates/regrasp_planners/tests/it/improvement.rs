@@ -368,8 +368,12 @@ fn a_search_ends_without_a_plan_where_its_own_work_is_spent_and_better_plans_hav
     let hopeless = scene("out_of_reach.toml");
     for (search_work, spent) in [(None, 400_000), (Some(30_000), 30_000)] {
         let failure = plan_in_hand(&hopeless.view(), &hopeless.in_hand(0), &asked(search_work), 0, &budget, &|_| {});
-        let work = failure.unwrap_err().statistics.work;
+        let failure = failure.unwrap_err();
+        let work = failure.statistics.work;
         assert!((spent..spent + 5_000).contains(&work), "{work} where {search_work:?} are allowed");
+        let names_it = failure.advice.contains("search_work");
+        assert!(search_work.is_some() || !names_it, "{}", failure.advice);
+        assert!(!(search_work.is_some() && failure.advice.contains("--max-work")), "{}", failure.advice);
     }
     let loaded = scene("box_90x.toml");
     let query = loaded.in_hand(3);

@@ -160,6 +160,9 @@ pub fn allow_more(kind: FailureKind) -> &'static str {
     }
 }
 
+/// What helps a search whose own work was too little (`search_work`), with more allowed.
+pub const ALLOW_MORE_SEARCH: &str = "allow the search more work (the setting search_work)";
+
 fn times(n: usize) -> String {
     match n {
         0 => "not even once".into(),

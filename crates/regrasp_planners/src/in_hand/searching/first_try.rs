@@ -23,8 +23,8 @@ const LONGER_WITH_MANY: u64 = 4;
 /// Fingers up to which they are not many.
 const FEW_FINGERS: usize = 4;
 
-/// Settings and work of what is tried first, in order, of `search_work` in all; none where there is nothing to try: more clearance and more closure, and
-/// more clearance alone.
+/// Settings and work of what is tried first, in order; none where there is nothing to try: more clearance and more closure, and
+/// more clearance alone. Each has a quarter of `search_work` at most.
 ///
 /// Where the query gives the start grasp (`gives_start`) they have no more work than twice that of a look along courses.
 pub fn first_tries(
