@@ -154,7 +154,8 @@ class Session:
         """A plan from `start` to `goal`, a pose of the object in the world, that the checker accepts; or a `Failure`.
 
         The plan brings what it was asked, so that `check` and `regrasp check` judge its file. seed, max_work, time_limit,
-        level, progress: as in `regrasp.plan`.
+        level, progress: as in `regrasp.plan`. A failure says what stopped the search, but not which change of the scene would have
+        helped: trying that takes time, and `regrasp.plan` does.
         """
         asked: dict[str, Any] = {
             "goal": _parts("Session.plan", "goal", goal),

@@ -155,11 +155,7 @@ pub struct Model<'a> {
 impl<'a> Model<'a> {
     /// True where a contact that is chosen may lie: off the edges, by the margin of the settings too.
     pub fn keeps_off_edges(&self, at: &SurfacePoint) -> bool {
-        let object = self.view.object;
-        object.keeps_off_edges(at)
-            && (self.settings.edge_margin <= 0.0
-                || object.edge_distance <= 0.0
-                || object.surface.crease_distance(at) >= object.edge_distance + self.settings.edge_margin)
+        self.view.object.keeps_farther_off_edges(at, self.settings.edge_margin)
     }
 
     /// True where a contact at `from` may roll to `to`: off the edges, and nearer to them than the margin allows only where it goes away.

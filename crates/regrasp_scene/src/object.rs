@@ -40,6 +40,12 @@ impl Object {
     /// True when a contact at `at` keeps its distance from creases.
     #[inline]
     pub fn keeps_off_edges(&self, at: &SurfacePoint) -> bool {
-        self.edge_distance <= 0.0 || self.surface.crease_distance(at) >= self.edge_distance
+        self.keeps_farther_off_edges(at, 0.0)
+    }
+
+    /// The same with `margin` more, in metres; contacts that may lie on edges may all the same.
+    #[inline]
+    pub fn keeps_farther_off_edges(&self, at: &SurfacePoint, margin: f64) -> bool {
+        self.edge_distance <= 0.0 || self.surface.crease_distance(at) >= self.edge_distance + margin
     }
 }

@@ -20,10 +20,10 @@ PLANNER: dict[str, Any] = {
     "shorten_relocation": 20_000,
     "cost": {"relocation": 1.0, "object_path": 8.0, "joint_path": 0.05, "margin": 0.05},
 }
-#: The same for objects with edges: fingertips never land quite where they should, and links stray. The grip is firmer: with friction 0.7
+#: ``PLANNER`` for objects with edges: fingertips never land quite where they should, and links stray. The grip is firmer: with friction 0.7
 #: of the scene's, 62 of 80 goals of a cube in the Allegro hand where 4 N had 36 (docs/benchmarks/execute.md).
 EDGED: dict[str, Any] = {**PLANNER, "clearance": 0.0006, "edge_margin": 0.002, "forces": {"squeeze": 6.0}}
-#: The same with more room for friction that is lower than thought. Plans are sought with these first: of 60 queries of that cube 23 have
+#: ``EDGED`` with more room for friction that is lower than thought. Plans are sought with these first: of 60 queries of that cube 23 have
 #: such a plan, 22 of them within this work.
 CAREFUL: dict[str, Any] = {**EDGED, "friction_margin": 2.0, "search_work": 300_000}
 #: These instead of ``CAREFUL`` for spheres and ellipsoids, which are soon squeezed out of the hand where fingertips slip. The grip is
@@ -37,11 +37,11 @@ CAREFUL_ROUND: dict[str, Any] = {**PLANNER, "friction_margin": 2.0, "forces": {"
 CLEAR_ROUND: dict[str, Any] = {**CAREFUL_ROUND, "clearance": 0.0006}
 #: These after them: the usual plans, but the grip stays as firm. Where it loosened as such a leg began, spheres fell.
 FIRM_ROUND: dict[str, Any] = {**PLANNER, "forces": {"squeeze": 6.0}}
-#: The same for starts that are worse than plans may be: links may be nearer to what they must not touch, grasps may hold less.
+#: ``PLANNER`` for starts that are worse than plans may be: links may be nearer to what they must not touch, grasps may hold less.
 LOOSE: dict[str, Any] = {**PLANNER, "clearance": 2e-5, "closure_margin": 0.001}
-#: The same with a firmer grip: legs are planned with these first where ``grip`` says so. Origin: pushes of 4 N on the bundled box.
+#: ``PLANNER`` with more room for friction and a firmer grip: legs are planned with these first where ``grip`` says so. Origin: pushes of 4 N on the bundled box.
 FIRM: dict[str, Any] = {**PLANNER, "friction_margin": 2.0, "forces": {"squeeze": 12.0, "normal_force": [2.0, 30.0]}}
-#: Plans that end in a grasp that holds well: the hand takes hold of the object anew, where no plan leads on from the present grasp.
+#: ``PLANNER`` with a better grasp at the end: so the hand takes hold of the object anew, where no plan leads on from the present grasp.
 ANEW: dict[str, Any] = {**PLANNER, "end_margin": 0.03}
 
 #: Shapes that are round everywhere.
