@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -93,8 +94,12 @@ class Session:
         """The hand that moves."""
         self.object = next(entry for entry in self.scene.objects if entry.name == self._task.object)
         """The object that it moves."""
-        self.times: QueryTimes | None = None
-        """Of the last `plan`, by whichever thread."""
+        self._times = threading.local()
+
+    @property
+    def times(self) -> QueryTimes | None:
+        """Of the last `plan` that this thread asked for; None where it asked for none."""
+        return getattr(self._times, "last", None)
 
     def project(
         self,
@@ -166,7 +171,7 @@ class Session:
             "progress": None if progress is None else _listener(progress),
         }
         found, outcome, times = self._native.plan(start._native, asked)
-        self.times = QueryTimes(*times)
+        self._times.last = QueryTimes(*times)
         if found is None:
             return failure_of(outcome)
         made = Plan(found, report=report_of(json.loads(outcome)))

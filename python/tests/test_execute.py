@@ -302,10 +302,11 @@ def test_a_search_on_a_thread_ends_when_nobody_wants_it() -> None:
     start = session.project(regrasp.Pose(plan.object_positions[0], plan.object_quat_xyzw[0]), plan.joints[0])
     assert start
     settings = ExecutorSettings(max_work=2**40)
-    planning = ThreadPlanning(session, settings, lambda plan, _: plan)
+    planning = ThreadPlanning([session], settings, lambda plan, _: plan)
     ticket = planning.ask(start, plan.goal, 0, 0.0)
+    assert not ticket.done.wait(0.3)
     planning.close()
-    assert ticket.done.is_set()
+    assert ticket.done.is_set() and ticket.answer is None and ticket.error is None
 
 
 def test_sessions_answer_and_refuse(scene: regrasp.Scene) -> None:

@@ -21,7 +21,7 @@ from regrasp.execute.settings import (
     CLEAR_ROUND,
     EDGED,
     FIRM,
-    FIRM_ROUND,
+    FIRMER,
     LOOSE,
     MESH_TIPS,
     PLANNER,
@@ -65,7 +65,7 @@ def test_hands_with_mesh_tips_get_an_eighth_of_the_work_for_more_plans() -> None
         plan = regrasp.plan(scene, seed=1)
         assert isinstance(plan, regrasp.Plan)
         session: Any = Counted(own, plan, 10_000)
-        settings = ExecutorSettings(choices=1000, choice_work=400_000)
+        settings = ExecutorSettings(choices=1000, choice_work=400_000, threads=1)
         planning = ChargedPlanning([session], settings, lambda _, __: None)
         start: Any = None
         ticket = planning.ask(start, regrasp.Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])), 0, 7.0)
@@ -75,7 +75,7 @@ def test_hands_with_mesh_tips_get_an_eighth_of_the_work_for_more_plans() -> None
         assert ticket.ready_at == pytest.approx(7.0 + charged)
 
 
-@pytest.mark.parametrize(("name", "careful"), [("box_90x", (CAREFUL, EDGED)), ("sphere_90x", (CLEAR_ROUND, CAREFUL_ROUND, FIRM_ROUND))])
+@pytest.mark.parametrize(("name", "careful"), [("box_90x", (CAREFUL, EDGED, FIRMER)), ("sphere_90x", (CLEAR_ROUND, CAREFUL_ROUND, FIRMER))])
 def test_sessions_of_a_scene_have_the_settings_of_execution(name: str, careful: tuple[dict[str, Any], ...]) -> None:
     scene = regrasp.load_scene(ROOT / f"scenes/{name}.toml")
     sessions = ExecutorSessions.of(scene)

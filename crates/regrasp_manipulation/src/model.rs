@@ -158,14 +158,16 @@ impl<'a> Model<'a> {
         self.view.object.keeps_farther_off_edges(at, self.settings.edge_margin)
     }
 
-    /// True where a contact at `from` may roll to `to`: off the edges, and nearer to them than the margin allows only where it goes away.
+    /// True where a contact at `from` may roll to `to`: off the edges, and nearer to them than the margin allows only where it does not come
+    /// nearer still. Contacts of an observed start may be nearer than the object asks for.
     pub fn may_roll(&self, from: &Contact, to: &SurfacePoint) -> bool {
         if self.keeps_off_edges(to) {
             return true;
         }
         let object = self.view.object;
-        let distance = |at: &SurfacePoint| object.surface.crease_distance(at);
-        object.keeps_off_edges(to) && distance(to) >= distance(&object.surface.project(&from.point_in_object))
+        let from = object.surface.project(&from.point_in_object);
+        let [was, now] = [&from, to].map(|at| object.surface.crease_distance(at));
+        now >= was - ALONG_AN_EDGE && (object.keeps_off_edges(to) || !object.keeps_off_edges(&from))
     }
 
     /// Prepares `view`; the scene's limits bound the settings.
@@ -429,6 +431,9 @@ fn object_body(object: &Object) -> Body {
 /// Share of the volume of its hull below which an object counts as far from convex. By hand: apples, cubes and bulbs have 0.85 and
 /// more, bananas and mugs 0.65 and less.
 const FOLDED: f64 = 0.8;
+
+/// By how much a contact that rolls along an edge may come nearer to it in a step, in metres: rounding.
+const ALONG_AN_EDGE: f64 = 1e-10;
 
 /// True where the mesh of `object` fills clearly less than its hull.
 fn folds(object: &Object) -> bool {

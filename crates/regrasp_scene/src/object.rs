@@ -4,6 +4,9 @@ use regrasp_geometry::collision::MeshBody;
 use regrasp_geometry::surface::SurfacePoint;
 use regrasp_geometry::{Point, Shape, Surface};
 
+/// Share of `edge_distance` that contacts of an observed start keep from creases at least: fingertips that slipped are where they are. By hand.
+pub const OBSERVED_EDGE_SHARE: f64 = 0.25;
+
 /// A rigid object. Its frame is the frame of its shape.
 #[derive(Debug, Clone)]
 pub struct Object {
@@ -47,5 +50,15 @@ impl Object {
     #[inline]
     pub fn keeps_farther_off_edges(&self, at: &SurfacePoint, margin: f64) -> bool {
         self.edge_distance <= 0.0 || self.surface.crease_distance(at) >= self.edge_distance + margin
+    }
+
+    /// True where a contact of an observed start may lie: off creases by a share of the distance ([`OBSERVED_EDGE_SHARE`]).
+    pub fn may_start_at(&self, at: &SurfacePoint) -> bool {
+        self.surface.crease_distance(at) >= self.least_observed_edge_distance()
+    }
+
+    /// What contacts of an observed start keep from creases at least, in metres.
+    pub fn least_observed_edge_distance(&self) -> f64 {
+        OBSERVED_EDGE_SHARE * self.edge_distance
     }
 }

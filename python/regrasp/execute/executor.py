@@ -419,7 +419,7 @@ class Executor(Steering):
                 duration=leg.n_ticks * self._plant.tick,
                 search_seconds=ticket.search_seconds,
                 check_seconds=ticket.check_seconds,
-                overhead_seconds=ticket.total_seconds - ticket.search_seconds - ticket.check_seconds,
+                overhead_seconds=ticket.overhead_seconds,
                 moved=dict(ticket.start.moved),
                 prepared=was_prepared,
                 free=free,

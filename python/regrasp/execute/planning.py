@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -10,12 +11,9 @@ from typing import Any, Protocol
 from .._model import Pose
 from .._plan import Plan
 from .._result import Failure
-from .._session import Session, Start
+from .._session import QueryTimes, Session, Start
+from .in_order import Answer, Cancelled, InOrder
 from .settings import ExecutorSettings, work_share
-
-
-class Cancelled(Exception):
-    """The search is not wanted any more."""
 
 
 @dataclass
@@ -32,10 +30,14 @@ class Ticket:
     answer: Plan | Failure | None = None
     error: BaseException | None = None
     work: float = 0.0
-    """Configurations that all searches looked at."""
+    """Configurations that all searches looked at whose answers counted,"""
+    span: float = 0.0
+    """and those that were looked at one after the other, where searches ran at once."""
     search_seconds: float = 0.0
+    """From asking to the answer, without the two below."""
     check_seconds: float = 0.0
-    total_seconds: float = 0.0
+    """Of the plan that is the answer."""
+    overhead_seconds: float = 0.0
     prepared: Any = None
     """What was made of the plan, by whoever planned."""
     cancelled: threading.Event = field(default_factory=threading.Event)
@@ -67,12 +69,19 @@ class Planning(Protocol):
 
 
 def _solve(sessions: Sessions, settings: ExecutorSettings, prepare: Prepare, ticket: Ticket, seed: int) -> None:
-    def listen(_: Any) -> None:
-        if ticket.cancelled.is_set():
-            raise Cancelled
+    began = time.perf_counter()
+    # One try of each careful session, then all tries of the last.
+    tries = [*sessions[:-1], *[sessions[-1]] * settings.plan_attempts]
+    # Other plans are made with the session that found the first.
+    chosen = tries[-1]
 
-    def ask(session: Session, number: int) -> Plan | Failure:
-        answer = session.plan(
+    def ask(number: int, is_unwanted: threading.Event) -> Answer:
+        def listen(_: Any) -> None:
+            if is_unwanted.is_set() or ticket.cancelled.is_set():
+                raise Cancelled
+
+        session = tries[number] if number < len(tries) else chosen
+        plan = session.plan(
             ticket.start,
             ticket.goal,
             seed=seed + number,
@@ -80,40 +89,40 @@ def _solve(sessions: Sessions, settings: ExecutorSettings, prepare: Prepare, tic
             time_limit=settings.time_limit,
             progress=listen,
         )
-        ticket.work += float(answer.statistics["work"])
-        times = session.times
-        if times is not None:
-            ticket.search_seconds += times.search
-            ticket.check_seconds += times.check
-            ticket.total_seconds += times.total
-        return answer
+        return Answer(plan, float(plan.statistics["work"]), session.times or QueryTimes(0.0, 0.0, 0.0))
 
-    answer: Plan | Failure | None = None
-    # One try of each careful session, then all tries of the last.
-    tries = [*sessions[:-1], *[sessions[-1]] * settings.plan_attempts]
-    for attempt, session in enumerate(tries):
-        answer = ask(session, attempt)
-        if isinstance(answer, Plan):
-            most_work = work_share(session.hand) * settings.choice_work
-            answer = _shortest(answer, lambda number: ask(session, len(tries) + number), ticket, (settings.choices, most_work))
-            ticket.prepared = prepare(answer, ticket.speed)
-            break
-    ticket.answer = answer
+    found: Plan | Failure | None = None
+    with InOrder(ask, settings.threads) as answers:
+        for number, session in enumerate(tries):
+            answer = answers.take(number, len(tries) - 1)
+            found, ticket.check_seconds = answer.plan, answer.times.check
+            if isinstance(found, Plan):
+                chosen = session
+                answers.drop()
+                most_work = work_share(session.hand) * settings.choice_work
+                found, ticket.check_seconds = _shortest((found, answer.times.check), answers, len(tries), (settings.choices, most_work))
+                break
+    ticket.work, ticket.span, ticket.overhead_seconds = answers.work, answers.span, answers.overhead_seconds
+    ticket.search_seconds = max(0.0, time.perf_counter() - began - ticket.check_seconds - ticket.overhead_seconds)
+    if isinstance(found, Plan):
+        ticket.prepared = prepare(found, ticket.speed)
+    ticket.answer = found
 
 
-def _shortest(plan: Plan, ask: Callable[[int], Plan | Failure], ticket: Ticket, limits: tuple[int, float]) -> Plan:
-    """The plan whose motion takes the least time, of this one and of others: so many in all, while so much work lasts."""
+def _shortest(found: tuple[Plan, float], answers: InOrder, first: int, limits: tuple[int, float]) -> tuple[Plan, float]:
+    """The plan whose motion takes the least time, with the seconds of its check: of the one found and of queries from number ``first`` on,
+    so many in all, while so much work lasts."""
     choices, most_work = limits
-    best, each = plan, ticket.work
-    for number in range(choices - 1):
+    best, each, end = found, max(answers.work, 1.0), first + choices - 1
+    for number in range(first, end):
         # What one more is likely to take; a motion of the object alone is as short as can be.
-        if ticket.work + each > most_work or best.statistics["relocations"] == 0:
+        if answers.work + each > most_work or best[0].statistics["relocations"] == 0:
             break
-        before = ticket.work
-        other = ask(number)
-        each = max(each, ticket.work - before)
-        if isinstance(other, Plan) and other.duration < best.duration:
-            best = other
+        likely = int((most_work - answers.work) // each)
+        other = answers.take(number, min(number + likely, end) - 1)
+        each = max(each, other.work)
+        if isinstance(other.plan, Plan) and other.plan.duration < best[0].duration:
+            best = (other.plan, other.times.check)
     return best
 
 
@@ -129,7 +138,7 @@ class ChargedPlanning:
         ticket = Ticket(start, goal, now, speed)
         _solve([*first, *self._sessions], self._settings, self._prepare, ticket, seed)
         rate = work_share(self._sessions[0].hand) * self._settings.work_rate
-        ticket.ready_at = now + ticket.work / rate + self._settings.planning_overhead
+        ticket.ready_at = now + ticket.span / rate + self._settings.planning_overhead
         return ticket
 
     def is_ready(self, ticket: Ticket, now: float) -> bool:

@@ -20,9 +20,11 @@ PLANNER: dict[str, Any] = {
     "shorten_relocation": 20_000,
     "cost": {"relocation": 1.0, "object_path": 8.0, "joint_path": 0.05, "margin": 0.05},
 }
-#: ``PLANNER`` for objects with edges: fingertips never land quite where they should, and links stray. The grip is firmer: with friction 0.7
-#: of the scene's, 62 of 80 goals of a cube in the Allegro hand where 4 N had 36 (docs/benchmarks/execute.md).
-EDGED: dict[str, Any] = {**PLANNER, "clearance": 0.0006, "edge_margin": 0.002, "forces": {"squeeze": 6.0}}
+#: ``PLANNER`` with a firmer grip, for all objects: with friction 0.7 of the scene's spheres fell where it loosened as such a leg began after a
+#: careful one, and of a cube in the Allegro hand fewer goals were reached (docs/benchmarks/execute.md).
+FIRMER: dict[str, Any] = {**PLANNER, "forces": {"squeeze": 6.0}}
+#: ``FIRMER`` for objects with edges: fingertips never land quite where they should, and links stray.
+EDGED: dict[str, Any] = {**FIRMER, "clearance": 0.0006, "edge_margin": 0.001}
 #: ``EDGED`` with more room for friction that is lower than thought. Plans are sought with these first: of 60 queries of that cube 23 have
 #: such a plan, 22 of them within this work.
 CAREFUL: dict[str, Any] = {**EDGED, "friction_margin": 2.0, "search_work": 300_000}
@@ -30,13 +32,11 @@ CAREFUL: dict[str, Any] = {**EDGED, "friction_margin": 2.0, "search_work": 300_0
 #: firmer: a fingertip that is not quite where it should be pushes along the surface, and slips less the more it presses. And the next
 #: plan begins with the grasp that one ends with, so that must hold well. By measurement with friction 0.7 of the scene's:
 #: docs/benchmarks/execute.md. A cube in the Allegro hand was given up or dropped with these.
-CAREFUL_ROUND: dict[str, Any] = {**PLANNER, "friction_margin": 2.0, "forces": {"squeeze": 6.0}, "end_margin": 0.02}
+CAREFUL_ROUND: dict[str, Any] = {**FIRMER, "friction_margin": 2.0, "end_margin": 0.02}
 #: These before ``CAREFUL_ROUND``: links keep farther away. A fingertip may touch a sphere beside the link that carries it. Where the sphere is
 #: a little off, that link presses in place of the tip, and no start is found any more. The wide hand's links stand back 1 mm behind their
 #: fingertips: in two runs with much trouble (friction 0.7) 8 of 80 legs had no plan with 0.6 mm.
 CLEAR_ROUND: dict[str, Any] = {**CAREFUL_ROUND, "clearance": 0.0006}
-#: These after them: the usual plans, but the grip stays as firm. Where it loosened as such a leg began, spheres fell.
-FIRM_ROUND: dict[str, Any] = {**PLANNER, "forces": {"squeeze": 6.0}}
 #: ``PLANNER`` for starts that are worse than plans may be: links may be nearer to what they must not touch, grasps may hold less.
 LOOSE: dict[str, Any] = {**PLANNER, "clearance": 2e-5, "closure_margin": 0.001}
 #: ``PLANNER`` with more room for friction and a firmer grip: legs are planned with these first where ``grip`` says so. Origin: pushes of 4 N on the bundled box.
@@ -59,7 +59,7 @@ def work_share(hand: Hand) -> float:
 
 def careful_settings(moved: Object) -> tuple[dict[str, Any], ...]:
     """The settings with which plans for this object are sought first, in order."""
-    return (CLEAR_ROUND, CAREFUL_ROUND, FIRM_ROUND) if moved.shape.kind in ROUND else (CAREFUL, EDGED)
+    return (CLEAR_ROUND, CAREFUL_ROUND, FIRMER) if moved.shape.kind in ROUND else (CAREFUL, EDGED, FIRMER)
 
 
 @dataclass(frozen=True)
@@ -164,6 +164,9 @@ class ExecutorSettings:
     regrips_round: bool = True
     """Where a leg of a sphere or ellipsoid went wrong on its way, the hand first takes hold of it anew, where it is, if the grasp that is left is
     weak: else the next leg begins with that, and slips sooner."""
+    threads: int = 2
+    """Searches for a leg that run at once: while careful plans are sought, so are the next less careful ones. Plans do not depend on it,
+    only how soon they are there."""
     plan_attempts: int = 3
     """Seeds that are tried for one leg."""
     choices: int = 20

@@ -259,9 +259,10 @@ fn valid(
             return Err(refusal(message, "grasp anew, or declare a larger pad"));
         }
         let foot = model.view.object.surface.project(&contact.point_in_object);
-        if !model.view.object.keeps_off_edges(&foot) {
-            let message =
-                format!("finger \"{name}\" touches nearer to an edge than {} m", model.view.object.edge_distance);
+        let body = model.view.object;
+        if !body.may_start_at(&foot) {
+            let least = body.least_observed_edge_distance();
+            let message = format!("finger \"{name}\" touches nearer to an edge than {least} m");
             return Err(refusal(message, "grasp anew, or allow a smaller edge_distance"));
         }
         fingers.push((Some(contact), own));

@@ -13,7 +13,7 @@ use crate::check::{CheckSettings, Log};
 use crate::plan::{ContactMode, Plan, SegmentKind, Waypoint};
 use regrasp_geometry::{Point, Pose, Vector};
 use regrasp_grasp::Contact;
-use regrasp_scene::Object;
+use regrasp_scene::{GraspRequest, Object, Query};
 use std::collections::BTreeSet;
 
 /// Most samples of one step; a step that needs more is one that no planner makes.
@@ -143,17 +143,31 @@ pub fn check_pads(model: &CheckedHand, plan: &Plan, log: &mut Log) {
 }
 
 /// Every contact of the plan lies on the object's surface, with the surface's normal, away from its edges: on an edge any
-/// normal between those of its faces is one. Tracking crosses edges, so contacts there may be near.
-pub fn check_contacts(object: &Object, model: &CheckedHand, plan: &Plan, settings: &CheckSettings, log: &mut Log) {
+/// normal between those of its faces is one. Tracking crosses edges, so contacts there may be near. Where the query says how the hand
+/// was observed, a fingertip that was near an edge then may stay there until it lifts, and come no nearer.
+pub fn check_contacts(
+    object: &Object,
+    query: Option<&Query>,
+    model: &CheckedHand,
+    plan: &Plan,
+    settings: &CheckSettings,
+    log: &mut Log,
+) {
     let mut seen = BTreeSet::new();
     let edges = Edges::of(&object.shape, object.crease_angle);
     let least = object.edge_distance - settings.surface_tolerance;
+    let mut observed = observed_near_edges(object, query, plan, &edges, settings.surface_tolerance);
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             for (f, state) in waypoint.contacts.iter().enumerate() {
+                if !state.holds() {
+                    observed[f] = None;
+                }
                 let (Some(point), Some(normal)) = (state.point_in_object, state.normal_in_object) else { continue };
                 let may_cross = segment.kind == SegmentKind::Tracking;
-                if !seen.insert((may_cross, point.map(f64::to_bits), normal.map(f64::to_bits))) {
+                let nearest_allowed = observed[f].unwrap_or(least);
+                let place = (point.map(f64::to_bits), normal.map(f64::to_bits));
+                if !seen.insert((may_cross, nearest_allowed.to_bits(), place)) {
                     continue;
                 }
                 let name = model.fingers[f].name.as_str();
@@ -176,16 +190,40 @@ pub fn check_contacts(object: &Object, model: &CheckedHand, plan: &Plan, setting
                     continue;
                 }
                 let edge = edges.distance(&Point::from(point), least);
-                if edge < least {
-                    let message = format!(
-                        "the contact of finger \"{name}\" is {edge:.3e} m from an edge, the scene asks for {:.3e}",
-                        object.edge_distance
-                    );
-                    log.push(tell(Kind::ContactTooNearEdge, message, edge, object.edge_distance));
+                if edge < nearest_allowed {
+                    let (limit, who) = match observed[f] {
+                        Some(_) => (nearest_allowed, "it was observed at"),
+                        None => (object.edge_distance, "the scene asks for"),
+                    };
+                    let message =
+                        format!("the contact of finger \"{name}\" is {edge:.3e} m from an edge, {who} {limit:.3e}");
+                    log.push(tell(Kind::ContactTooNearEdge, message, edge, limit));
                 }
             }
         }
     }
+}
+
+/// For every finger that the query has observed nearer to an edge than the scene allows, but no nearer than may be: how near it was, less the
+/// tolerance. That the plan begins as it was observed is judged elsewhere.
+fn observed_near_edges(
+    object: &Object,
+    query: Option<&Query>,
+    plan: &Plan,
+    edges: &Edges,
+    tolerance: f64,
+) -> Vec<Option<f64>> {
+    let mut observed = vec![None; plan.fingers.len()];
+    let Some(GraspRequest::Posture { holds, .. }) = query.map(Query::start_grasp) else { return observed };
+    let Some(first) = plan.segments.first().and_then(|segment| segment.waypoints.first()) else { return observed };
+    let least = object.edge_distance - tolerance;
+    for ((observed, contact), _) in observed.iter_mut().zip(&first.contacts).zip(holds).filter(|(_, holds)| **holds) {
+        let Some(point) = contact.point_in_object else { continue };
+        let distance = edges.distance(&Point::from(point), least);
+        let may_be = distance < least && distance >= object.least_observed_edge_distance() - tolerance;
+        *observed = may_be.then_some(distance - tolerance);
+    }
+    observed
 }
 
 pub(super) fn off_contact(finger: &FingerModel, error: f64, tolerance: f64) -> Violation {

@@ -460,7 +460,7 @@ fn judge(
         judge_tips(task, plan, settings, model, log, report);
     }
     contact::check_pads(model, plan, log);
-    contact::check_contacts(task.object(), model, plan, settings, log);
+    contact::check_contacts(task.object(), query, model, plan, settings, log);
     let at_waypoints = promises::check_closure(task.object(), model, plan, settings, log);
     let between = match leap {
         None => rolling_closure::check_rolling_closure(task.object(), model, plan, settings, log),

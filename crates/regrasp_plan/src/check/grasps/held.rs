@@ -17,7 +17,7 @@ const TIE_TOLERANCE: f64 = 1e-9;
 /// Contacts of all grasps on the surface, away from edges; fingertips that touch with their pads.
 pub(super) fn check_contacts(judged: &Judged, log: &mut Log) {
     let object = judged.scene.manipulation().object();
-    contact::check_contacts(object, judged.model, judged.plan, judged.settings, log);
+    contact::check_contacts(object, None, judged.model, judged.plan, judged.settings, log);
     check_pads(judged.model, judged.plan, log);
 }
 

@@ -1,0 +1,162 @@
+//! Starts whose fingertips have come to rest nearer to an edge than the scene lets plans put them. Distances are those of the box itself: a
+//! point lies on one pair of faces, and an edge is where it would lie on a second one.
+
+use regrasp::base::Budget;
+use regrasp::geometry::Pose;
+use regrasp::plan::ContactMode;
+use regrasp::plan::check::{CheckSettings, ViolationKind};
+use regrasp::plan::plan::{Plan, Waypoint};
+use regrasp::planners::in_hand::starting::{Observation, ProjectionLimits};
+use regrasp::robot::LoadOptions;
+use regrasp::scene::{LoadedScene, load_scene_text};
+use regrasp::session::Session;
+use regrasp::{Failure, InHandSettings};
+use std::path::Path;
+
+const HALF: [f64; 3] = [0.025, 0.025, 0.030];
+const EDGE_DISTANCE: f64 = 0.004;
+
+/// The box of 50 x 50 x 60 mm; contacts keep so far from its edges.
+fn loaded(edge_distance: f64) -> LoadedScene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/box_90x.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let text = text.replace("friction = 0.8", &format!("friction = 0.8\nedge_distance = {edge_distance}"));
+    load_scene_text(&path, text.into_bytes(), &LoadOptions::default()).unwrap()
+}
+
+fn edge_distance_of(point: [f64; 3]) -> f64 {
+    let mut inside: Vec<f64> = point.iter().zip(HALF).map(|(x, half)| half - x.abs()).collect();
+    inside.sort_by(f64::total_cmp);
+    assert!(inside[0].abs() < 1e-6, "{point:?} is on a face");
+    inside[1]
+}
+
+/// For every finger that holds, how far its contact is from the nearest edge.
+fn edge_distances(waypoint: &Waypoint) -> Vec<Option<f64>> {
+    let held = waypoint.contacts.iter().map(|contact| match contact.mode {
+        ContactMode::Free => None,
+        _ => contact.point_in_object,
+    });
+    held.map(|point| point.map(edge_distance_of)).collect()
+}
+
+/// A plan of a hand that puts its fingertips as near to edges as 0.2 mm, and its waypoints at which one is between `near` of the given
+/// distances.
+fn careless(seed: u64, near: [f64; 2]) -> (Plan, Vec<Waypoint>) {
+    let loaded = loaded(0.0002);
+    let query = loaded.task().query(seed);
+    let (query, settings) = (query.as_in_hand().unwrap(), InHandSettings::default());
+    let view = regrasp::HandView::of(&loaded.manipulation());
+    let plan = regrasp::plan_in_hand(&view, query, &settings, seed, &Budget::work(2_000_000), &|_| {}).unwrap();
+    let is_near = |waypoint: &&Waypoint| {
+        let nearest = edge_distances(waypoint).into_iter().flatten().fold(f64::INFINITY, f64::min);
+        near[0] < nearest && nearest < near[1]
+    };
+    let ends = plan.segments.iter().flat_map(|segment| [&segment.waypoints[0], segment.waypoints.last().unwrap()]);
+    let found = ends.filter(is_near).cloned().collect();
+    (plan, found)
+}
+
+fn observation(waypoint: &Waypoint) -> Observation {
+    Observation {
+        world_from_object: Pose::from(&waypoint.world_from_object),
+        joints: waypoint.joints.clone(),
+        velocities: None,
+        presses: None,
+    }
+}
+
+/// A plan from one of `waypoints` back to where the task begins.
+fn back(session: &Session, goal: &Pose, waypoint: &Waypoint, seed: u64) -> Result<Plan, Failure> {
+    let start = session.project(&observation(waypoint), &ProjectionLimits::default())?;
+    session.plan(&start, goal, seed, &Budget::work(2_000_000), &|_| {})
+}
+
+fn kinds(session: &Session, plan: &Plan) -> Vec<ViolationKind> {
+    session.check(plan, &CheckSettings::default()).violations.iter().map(|violation| violation.kind).collect()
+}
+
+#[test]
+fn a_fingertip_that_came_to_rest_near_an_edge_goes_away_from_it_or_lifts() {
+    let strict = loaded(EDGE_DISTANCE);
+    let session = Session::open(&strict, None, InHandSettings::default()).unwrap();
+    let query = strict.task().query(0);
+    let (mut n_plans, mut n_rolled, mut n_nearer) = (0, 0, 0);
+    for seed in 0..12 {
+        let (_, near) = careless(seed, [0.25 * EDGE_DISTANCE, EDGE_DISTANCE]);
+        let Some(waypoint) = near.first() else { continue };
+        let Ok(plan) = back(&session, query.start(), waypoint, seed) else { continue };
+        n_plans += 1;
+        assert_eq!(kinds(&session, &plan), [], "seed {seed}");
+        let all: Vec<Vec<Option<f64>>> =
+            plan.segments.iter().flat_map(|segment| &segment.waypoints).map(edge_distances).collect();
+        for finger in 0..all[0].len() {
+            let mut has_lifted = false;
+            for pair in all.windows(2) {
+                let [was, now] = [pair[0][finger], pair[1][finger]];
+                has_lifted |= now.is_none();
+                let Some(now) = now.filter(|now| *now < EDGE_DISTANCE - 1e-9) else { continue };
+                assert!(!has_lifted, "seed {seed}: finger {finger} landed {now} from an edge");
+                assert!(now >= was.unwrap() - 1e-9, "seed {seed}: finger {finger} from {was:?} to {now}");
+                n_rolled += usize::from(now > was.unwrap() + 1e-9);
+            }
+        }
+        // Fingertips that keep still are as near as they were all along.
+        let first = all[0].iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        assert!(first < EDGE_DISTANCE && first >= 0.25 * EDGE_DISTANCE - 1e-5);
+
+        // The judge takes nobody's word for it: the same plan where nothing was observed, and one that comes nearer.
+        let mut unasked = plan.clone();
+        unasked.asked = None;
+        assert!(kinds(&session, &unasked).contains(&ViolationKind::ContactTooNearEdge), "seed {seed}");
+        let finger = all[0].iter().position(|distance| *distance == Some(first)).unwrap();
+        let mut nearer = plan.clone();
+        let segment = &mut nearer.segments[0];
+        let moved = segment.waypoints.last_mut().unwrap();
+        if moved.contacts[finger].mode != ContactMode::Free {
+            let point = moved.contacts[finger].point_in_object.as_mut().unwrap();
+            towards_the_edge(point, edge_distance_of(*point) - first + 1e-4);
+            assert!(kinds(&session, &nearer).contains(&ViolationKind::ContactTooNearEdge), "seed {seed}");
+            n_nearer += 1;
+        }
+        // And one that lands where it was allowed to begin.
+        let mut landed = plan.clone();
+        let mut has_lifted = false;
+        let ways = landed.segments.iter_mut().flat_map(|segment| &mut segment.waypoints);
+        let again = ways.map(|waypoint| &mut waypoint.contacts[finger]).find(|contact| {
+            has_lifted |= contact.mode == ContactMode::Free;
+            has_lifted && contact.mode != ContactMode::Free
+        });
+        if let Some(contact) = again {
+            let begun = &plan.segments[0].waypoints[0].contacts[finger];
+            (contact.point_in_object, contact.normal_in_object) = (begun.point_in_object, begun.normal_in_object);
+            assert!(kinds(&session, &landed).contains(&ViolationKind::ContactTooNearEdge), "seed {seed}");
+        }
+    }
+    assert!(n_plans >= 4 && n_nearer >= 3, "{n_plans} plans, {n_nearer} of them changed, {n_rolled} steps away");
+}
+
+/// Moves a point on a face by `distance` towards the edge that is nearest.
+fn towards_the_edge(point: &mut [f64; 3], distance: f64) {
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|&a, &b| (HALF[a] - point[a].abs()).total_cmp(&(HALF[b] - point[b].abs())));
+    let axis = axes[1];
+    point[axis] += distance.copysign(point[axis]);
+}
+
+#[test]
+fn a_fingertip_on_the_edge_itself_is_no_start() {
+    let strict = loaded(EDGE_DISTANCE);
+    let session = Session::open(&strict, None, InHandSettings::default()).unwrap();
+    let mut n_refused = 0;
+    for seed in 0..12 {
+        for waypoint in careless(seed, [0.0, 0.25 * EDGE_DISTANCE - 1e-4]).1 {
+            // Without room to move the fingertip away.
+            let limits = ProjectionLimits { distance: 1e-5, turn: 1e-3, ..ProjectionLimits::default() };
+            let failure = session.project(&observation(&waypoint), &limits).unwrap_err();
+            assert!(failure.message.contains("nearer to an edge than 0.001 m"), "{}", failure.message);
+            n_refused += 1;
+        }
+    }
+    assert!(n_refused >= 3, "only {n_refused}");
+}
