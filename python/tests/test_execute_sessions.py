@@ -100,7 +100,7 @@ def test_sessions_of_a_scene_have_the_settings_of_execution(name: str, careful: 
 
 
 def test_only_the_work_for_better_plans_is_shared() -> None:
-    assert planner_settings(CAREFUL, 0.125) == {**CAREFUL, "improve_work": 7500, "shorten_relocation": 2500}
+    assert planner_settings(CAREFUL, 0.125) == {**CAREFUL, "improve_work": 7500}
 
 
 @needs_models

@@ -103,7 +103,7 @@ fn a_fingertip_that_came_to_rest_near_an_edge_goes_away_from_it_or_lifts() {
         }
         // Fingertips that keep still are as near as they were all along.
         let first = all[0].iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        assert!(first < EDGE_DISTANCE && first >= 0.25 * EDGE_DISTANCE - 1e-5);
+        assert!((0.25 * EDGE_DISTANCE - 1e-5..EDGE_DISTANCE).contains(&first), "{first}");
 
         // The judge takes nobody's word for it: the same plan where nothing was observed, and one that comes nearer.
         let mut unasked = plan.clone();

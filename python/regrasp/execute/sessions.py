@@ -38,6 +38,6 @@ class ExecutorSessions:
 
 
 def planner_settings(settings: Mapping[str, Any], share: float) -> dict[str, Any]:
-    """The same with so much of the work for better plans. Plans that the planner calls long are shortened with 20,000 configurations all
-    the same."""
-    return {**settings, **{key: round(share * settings[key]) for key in ("improve_work", "shorten_relocation")}}
+    """The same with so much of the work for better plans. How much a relocation is worth the planner knows by itself; plans that it calls long
+    are shortened with 20,000 configurations at least."""
+    return {**settings, "improve_work": round(share * settings["improve_work"])}

@@ -2,7 +2,7 @@
 
 use super::geodesic::Geodesic;
 use super::smooth_geodesic::straightened;
-use super::{SurfaceKind, SurfacePoint, across, bar_operator, quadratic_roots, unit_or};
+use super::{Facing, SurfaceKind, SurfacePoint, across, bar_operator, quadratic_roots, unit_or};
 use crate::frame::{Point, UnitVector, Vector};
 use nalgebra::Matrix3;
 use regrasp_base::Rng;
@@ -79,6 +79,13 @@ impl SurfaceKind for CapsuleSurface {
 
     fn signed_distance(&self, point: &Point) -> f64 {
         (point - self.core(point)).norm() - self.radius
+    }
+
+    fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<(Facing, Point)> {
+        Some(match from.z.abs() < self.half_length {
+            true => (Facing::Edge(Vector::z_axis()), Point::origin()),
+            false => (Facing::Corner, self.core(&at.point_in_object)),
+        })
     }
 
     fn crease_distance(&self, _at: &SurfacePoint) -> f64 {

@@ -173,14 +173,15 @@ impl SurfaceKind for CuboidSurface {
         excess.sup(&Vector::zeros()).norm() + excess.max().min(0.0)
     }
 
-    fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<Facing> {
+    fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<(Facing, Point)> {
         let is_beyond = |k: &usize| from[*k].abs() > self.half_extents[*k];
-        match (0..3).filter(is_beyond).count() {
+        let facing = match (0..3).filter(is_beyond).count() {
             1 => Some(Facing::Face(face_normal(at.facet))),
             2 => (0..3).find(|k| !is_beyond(k)).map(|along| Facing::Edge(Vector::ith_axis(along))),
             3 => Some(Facing::Corner),
             _ => None,
-        }
+        };
+        facing.map(|facing| (facing, at.point_in_object))
     }
 
     fn crease_distance(&self, at: &SurfacePoint) -> f64 {

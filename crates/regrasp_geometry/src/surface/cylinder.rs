@@ -1,7 +1,7 @@
 //! The surface of a cylinder about z. Faces: 0 side, 1 top, 2 bottom.
 
 use super::geodesic::{Bend, Geodesic, Leg};
-use super::{SurfaceKind, SurfacePoint, bar_operator, quadratic_roots};
+use super::{Facing, SurfaceKind, SurfacePoint, bar_operator, quadratic_roots};
 use crate::frame::{Point, UnitVector, Vector};
 use nalgebra::Matrix3;
 use regrasp_base::Rng;
@@ -122,6 +122,16 @@ impl SurfaceKind for CylinderSurface {
     fn signed_distance(&self, point: &Point) -> f64 {
         let (side, cap) = (point.x.hypot(point.y) - self.radius, point.z.abs() - self.half_length);
         side.max(0.0).hypot(cap.max(0.0)) + side.max(cap).min(0.0)
+    }
+
+    fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<(Facing, Point)> {
+        let is_beside = from.z.abs() < self.half_length;
+        let is_over = from.x.hypot(from.y) < self.radius;
+        match at.facet {
+            0 if is_beside => Some((Facing::Edge(Vector::z_axis()), Point::origin())),
+            1 | 2 if is_over => Some((Facing::Face(cap_normal(at.facet)), at.point_in_object)),
+            _ => None,
+        }
     }
 
     fn crease_distance(&self, at: &SurfacePoint) -> f64 {

@@ -280,13 +280,14 @@ impl SurfaceKind for MeshSurface {
         (self.surface_point(facet, on_surface), self.signed(point - on_surface, facet, feature))
     }
 
-    fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<Facing> {
+    fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<(Facing, Point)> {
         let corners = self.corners(at.facet);
-        Some(match nearest_on_triangle(&corners, from).1 {
+        let facing = match nearest_on_triangle(&corners, from).1 {
             Feature::Inside => Facing::Face(self.face_normal(at.facet)),
             Feature::Edge(k) => Facing::Edge(UnitVector::try_new(corners[(k + 1) % 3] - corners[k], 0.0)?),
             Feature::Corner(_) => Facing::Corner,
-        })
+        };
+        Some((facing, at.point_in_object))
     }
 
     fn crease_distance(&self, at: &SurfacePoint) -> f64 {

@@ -51,14 +51,15 @@ impl SurfacePoint {
     }
 }
 
-/// What the nearest point of a surface made of flat faces lies on, as long as the point that sees it moves little.
+/// What a surface is near the point that is nearest to another one, as long as that moves little: all that is equally far from a plane, a
+/// line or a point. Of polyhedra these are faces, edges and corners themselves; of round bodies axes and centres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Facing {
-    /// A flat face, with its outward normal.
+    /// A plane, with its outward normal.
     Face(UnitVector),
-    /// A straight edge, with its direction.
+    /// A straight line, with its direction.
     Edge(UnitVector),
-    /// A corner.
+    /// A point.
     Corner,
 }
 
@@ -104,7 +105,7 @@ trait SurfaceKind: std::fmt::Debug + Send + Sync {
         (self.project(point), self.signed_distance(point))
     }
     /// See [`Surface::facing`].
-    fn facing(&self, _at: &SurfacePoint, _from: &Point) -> Option<Facing> {
+    fn facing(&self, _at: &SurfacePoint, _from: &Point) -> Option<(Facing, Point)> {
         None
     }
     fn crease_distance(&self, at: &SurfacePoint) -> f64;
@@ -209,8 +210,9 @@ impl Surface {
         self.kind.project_signed(point, (point - on_surface).norm())
     }
 
-    /// What the point `at` lies on, which is nearest to the point `from` outside; None on surfaces that are curved.
-    pub fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<Facing> {
+    /// What the surface is near the point `at`, which is nearest to the point `from` outside, and a point of that plane, line or point; None
+    /// where it is none of these, as on rims and ellipsoids.
+    pub fn facing(&self, at: &SurfacePoint, from: &Point) -> Option<(Facing, Point)> {
         self.kind.facing(at, from)
     }
 

@@ -1,7 +1,7 @@
 //! The surface of a ball about the origin. One face, number 0.
 
 use super::geodesic::Geodesic;
-use super::{SurfaceKind, SurfacePoint, across, quadratic_roots, unit_or};
+use super::{Facing, SurfaceKind, SurfacePoint, across, quadratic_roots, unit_or};
 use crate::frame::{Point, UnitVector, Vector};
 use nalgebra::Matrix3;
 use regrasp_base::Rng;
@@ -40,6 +40,10 @@ impl SurfaceKind for SphereSurface {
 
     fn signed_distance(&self, point: &Point) -> f64 {
         point.coords.norm() - self.radius
+    }
+
+    fn facing(&self, _at: &SurfacePoint, _from: &Point) -> Option<(Facing, Point)> {
+        Some((Facing::Corner, Point::origin()))
     }
 
     fn crease_distance(&self, _at: &SurfacePoint) -> f64 {

@@ -494,43 +494,56 @@ fn bad_lengths_are_refused() {
 
 mod geodesics;
 
-/// What is nearest stays so, as a plane, a line or a point, when the point that sees it moves a little.
+/// What is nearest stays so when the point that sees it moves a little: as far from a plane, a line or a point as before, towards who sees it.
 #[test]
-fn what_is_nearest_is_a_face_an_edge_or_a_corner() {
+fn what_is_nearest_is_as_far_from_a_plane_a_line_or_a_point() {
     let half_extents = Vector::new(0.03, 0.02, 0.01);
     let corners: Vec<Point> = (0..8)
         .map(|k| Vector::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - Vector::repeat(1.0))
         .map(|sign| Point::from(sign.component_mul(&half_extents)))
         .collect();
+    let hull = Shape::Convex(ConvexHull::new(&corners).unwrap().into());
+    let (half_length, radius) = (0.015, 0.012);
     let mut rng = Rng::keyed(3, "facing", 0);
-    for shape in [Shape::Cuboid { half_extents }, Shape::Convex(ConvexHull::new(&corners).unwrap().into())] {
+    // Which of the three kinds a shape has, and whether there are places without any.
+    for (shape, kinds, has_others) in [
+        (Shape::Cuboid { half_extents }, [true, true, true], false),
+        (hull, [true, true, true], false),
+        (Shape::Sphere { radius }, [false, false, true], false),
+        (Shape::Cylinder { half_length, radius }, [true, true, false], true),
+        (Shape::Capsule { half_length, radius }, [false, true, true], false),
+        (Shape::Ellipsoid { radii: half_extents }, [false; 3], true),
+    ] {
         let surface = Surface::of(&shape).unwrap();
-        let mut seen = [0; 3];
+        let (mut seen, mut n_others) = ([0; 3], 0);
         for _ in 0..300 {
-            let from = Point::from(Vector::from(rng.direction()).component_mul(&Vector::repeat(0.05)));
+            let from = Point::from(Vector::from(rng.direction()) * 0.05);
             let (foot, distance) = surface.project_signed(&from);
             if distance < 1e-3 {
                 continue;
             }
-            let facing = surface.facing(&foot, &from).unwrap();
-            let nudge = Vector::from(rng.direction()) * 1e-6;
-            let (moved, _) = surface.project_signed(&(from + nudge));
-            let way = moved.point_in_object - foot.point_in_object;
-            let expected = match facing {
-                Facing::Face(normal) => nudge - normal.as_ref() * normal.dot(&nudge),
-                Facing::Edge(along) => along.as_ref() * along.dot(&nudge),
-                Facing::Corner => Vector::zeros(),
+            let Some((facing, place)) = surface.facing(&foot, &from) else {
+                n_others += 1;
+                continue;
             };
+            // The nearest point of the plane, the line or the point.
+            let core = |point: &Point| match facing {
+                Facing::Face(normal) => point - normal.as_ref() * normal.dot(&(point - place)),
+                Facing::Edge(along) => place + along.as_ref() * along.dot(&(point - place)),
+                Facing::Corner => place,
+            };
+            let away = (foot.point_in_object - core(&from)).norm();
+            let moved = from + Vector::from(rng.direction()) * 1e-6;
+            let expected = core(&moved) + (moved - core(&moved)).normalize() * away;
+            let found = surface.project_signed(&moved).0.point_in_object;
             seen[match facing {
                 Facing::Face(_) => 0,
                 Facing::Edge(_) => 1,
                 Facing::Corner => 2,
             }] += 1;
-            assert!((way - expected).norm() < 1e-12, "{shape:?}: {facing:?} {way} {expected}");
+            assert!((found - expected).norm() < 1e-12, "{shape:?}: {facing:?} {found} {expected}");
         }
-        assert!(seen.iter().all(|n| *n > 10), "{seen:?}");
+        assert_eq!(seen.map(|n| n > 10), kinds, "{shape:?}: {seen:?}");
+        assert_eq!(n_others > 10, has_others, "{shape:?}: {n_others}");
     }
-    let sphere = Surface::of(&Shape::Sphere { radius: 0.03 }).unwrap();
-    let from = Point::new(0.05, 0.0, 0.0);
-    assert!(sphere.facing(&sphere.project(&from), &from).is_none());
 }

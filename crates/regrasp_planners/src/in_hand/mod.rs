@@ -56,6 +56,7 @@ use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_scene::{GraspRequest, HandView, InHandQuery};
 use searching::attempts::{ALLOW_MORE_SEARCH, Left, allow_more, run_attempts};
+use searching::duration::times_longer;
 use searching::first_try;
 use searching::legs::{Legs, Solution, plan_legs};
 use std::sync::atomic::AtomicUsize;
@@ -280,7 +281,7 @@ fn shortening_work(model: &Model, settings: &InHandSettings, (legs, is_stuck): (
         return 0;
     }
     let share = (plan.statistics.work as f64 * shorten_share) as u64;
-    let per_relocation = if legs.start_grasp.is_some() { shorten_relocation } else { 0 };
+    let per_relocation = if legs.start_grasp.is_some() { shorten_relocation / times_longer(model.view) } else { 0 };
     share.max(LEAST_SHORTENING).max(per_relocation.saturating_mul(plan.n_relocations()))
 }
 

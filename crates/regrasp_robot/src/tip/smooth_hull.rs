@@ -119,16 +119,12 @@ impl SmoothHull {
     #[inline]
     fn powers(&self, n: &Vector, mut each: impl FnMut(usize, &[f64; 3], f64, f64)) -> (f64, f64) {
         let (indices, points) = self.table.near(n);
-        let mut along = [0.0; MOST_POINTS];
-        let along = &mut along[..points.len()];
-        let mut largest = 0.0f64;
-        for (along, [x, y, z]) in along.iter_mut().zip(points) {
-            *along = x * n.x + y * n.y + z * n.z;
-            largest = largest.max(*along);
-        }
+        let along = |[x, y, z]: &[f64; 3]| x * n.x + y * n.y + z * n.z;
+        let largest = points.iter().map(along).fold(0.0, |most: f64, s| if s > most { s } else { most });
         let least = LEAST_SHARE * largest;
         let mut sum = 0.0;
-        for ((&s, point), &i) in along.iter().zip(points).zip(indices) {
+        for (point, &i) in points.iter().zip(indices) {
+            let s = along(point);
             if s > least {
                 let power = power(s / largest);
                 sum += power;
@@ -221,10 +217,11 @@ fn power(q: f64) -> f64 {
     q64 * q64 * q64 * q8
 }
 
-/// The `p`-th root of a sum that is at least one.
+/// The `p`-th root of a sum from 1 to [`MOST_POINTS`]: by the series of the exponential, whose rest is below 1e-14 there.
 #[inline]
 fn root(sum: f64) -> f64 {
-    (sum.ln() / f64::from(EXPONENT)).exp()
+    let x = sum.ln() / f64::from(EXPONENT);
+    1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0)))))
 }
 
 /// What the surface is to be in one direction.

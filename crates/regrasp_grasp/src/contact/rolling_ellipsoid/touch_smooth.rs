@@ -4,8 +4,9 @@
 //! nearest point of the object gives another normal. Where both agree the tip touches.
 //!
 //! Where the object is made of flat faces, the normal is sought with which the tip would touch the face, edge or corner that is
-//! nearest now, as if there were no other. Mostly that is where it touches; else what is nearest then is the next guess. Where
-//! that does not bring the normals nearer to each other, and on curved objects, Newton's method finds the touch: the tip's radii
+//! nearest now, as if there were no other. Mostly that is where it touches; else what is nearest then is the next guess. A ball is touched
+//! with the normal with which its centre would be, the side of a cylinder with that of its axis. Where
+//! that does not bring the normals nearer to each other, and on other curved objects, Newton's method finds the touch: the tip's radii
 //! of curvature say how the point moves over the tip when the normal turns, and two nudges how the nearest point of the object
 //! moves, on faces, edges and corners alike.
 
@@ -111,8 +112,8 @@ fn nearer_alone(
     now: &Seen,
     see: &impl Fn(Vector, Option<&Point>) -> Option<Seen>,
 ) -> Option<Seen> {
-    let facing = surface.facing(&now.foot, &now.from)?;
-    let normal = alone::normal(tip, &Stance { normal: now.normal, ..*stance }, &facing, &now.foot.point_in_object)?;
+    let (facing, place) = surface.facing(&now.foot, &now.from)?;
+    let normal = alone::normal(tip, &Stance { normal: now.normal, ..*stance }, &facing, &place)?;
     let step = normal - now.normal;
     let mut share = (LONGEST_STEP / step.norm()).min(1.0);
     (0..HALVINGS_ALONE).find_map(|_| {

@@ -2,26 +2,17 @@
 //! gives, links stray by more than plans keep them away, and what they touch then throws the object.
 
 use super::attempts::{MOVE_THE_START, allow_more, within};
+use super::duration::times_longer_to_search;
 use crate::settings::{InHandSettings, Method, SearchSettings};
 use regrasp_geometry::collision::support::support_value;
 use regrasp_geometry::{Vector, frame};
 use regrasp_manipulation::failure::Failure;
 use regrasp_manipulation::settings::PhysicsSettings;
 use regrasp_robot::Finger;
-use regrasp_robot::tip::CurvedTip;
 use regrasp_scene::HandView;
 
 /// Directions across a link in which its width is measured.
 const DIRECTIONS: usize = 32;
-
-/// How many times longer the same work takes where fingertips that are meshes roll on meshes: with all of it, tries would take up
-/// to a minute there. Measured on scans in the LEAP hand: 135 to 190 microseconds a configuration, where the Allegro's balls take 3.
-const LONGER: u64 = 16;
-/// The same for hands of more than four fingers, whose sets of fingers are many. Measured on the Shadow hand: a configuration takes 22
-/// microseconds where it takes 7 in the Allegro.
-const LONGER_WITH_MANY: u64 = 4;
-/// Fingers up to which they are not many.
-const FEW_FINGERS: usize = 4;
 
 /// Settings and work of what is tried first, in order; none where there is nothing to try: more clearance and more closure, and
 /// more clearance alone. Each has a quarter of `search_work` at most.
@@ -38,7 +29,7 @@ pub fn first_tries(
         true => wanted.work.min(settings.search.courses_work.saturating_mul(2)),
         false => wanted.work,
     };
-    let most_work = most_work / times_longer(view);
+    let most_work = most_work / times_longer_to_search(view);
     let can_keep = |finger: &Finger| stand_back(finger).is_none_or(|back| back >= 2.0 * wanted.clearance);
     let keeps_away = wanted.clearance > settings.physics.clearance && view.hand.fingers.iter().all(can_keep);
     let closes_more = wanted.closure_margin > settings.physics.closure_margin;
@@ -69,17 +60,6 @@ pub fn tell(failure: &mut Failure, missed: Vec<Failure>) {
         failure.advice = allow_more(failure.kind).into();
     }
     failure.nearest_miss = Some(nearest);
-}
-
-/// How many times longer than in a hand of four fingers with balls a configuration takes, about.
-fn times_longer(view: &HandView) -> u64 {
-    let is_smooth = |finger: &Finger| matches!(finger.tip.curved(), Some(CurvedTip::Smooth(_)));
-    let meshes_roll = view.object.surface.mesh().is_some() && view.hand.fingers.iter().any(is_smooth);
-    match (meshes_roll, view.hand.fingers.len() > FEW_FINGERS) {
-        (true, _) => LONGER,
-        (false, true) => LONGER_WITH_MANY,
-        (false, false) => 1,
-    }
 }
 
 /// How far the link behind a round tip stands back behind it where it is thinnest, in metres: no finger keeps its last link

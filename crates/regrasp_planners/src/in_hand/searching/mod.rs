@@ -4,6 +4,8 @@
 pub mod attempts;
 /// The baseline of Saut 2011.
 pub mod classic;
+/// How long configurations take.
+pub mod duration;
 /// A first try with more room.
 pub mod first_try;
 /// Two gait trees that grow until they meet.
