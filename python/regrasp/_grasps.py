@@ -51,6 +51,11 @@ class GraspList:
         return cast("list[str]", self._data["hand"]["joint_names"])
 
     @property
+    def held_joints(self) -> dict[str, float]:
+        """Joints of the hand that no grasp moves, such as a wrist's, and where they stand, in radians or metres."""
+        return dict(cast("dict[str, float]", self._data["hand"].get("held_joints", {})))
+
+    @property
     def joints(self) -> FloatArray:
         """(grasps, joints): joint positions of the grasps."""
         return np.array([grasp["joints"] for grasp in self.grasps], dtype=np.float64)

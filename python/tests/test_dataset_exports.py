@@ -16,7 +16,7 @@ from regrasp.dataset import Episode, make, read_episodes, specification_of, veri
 from regrasp.dataset.export_files import export_robomimic  # noqa: E402
 from regrasp.dataset.export_lerobot import export_lerobot  # noqa: E402
 from regrasp.dataset.frames import frames_of  # noqa: E402
-from test_dataset import shards, text_of  # noqa: E402
+from test_dataset import SCENES, shards, text_of  # noqa: E402
 
 FPS = 25
 
@@ -105,6 +105,50 @@ def test_the_hdf5_file_has_the_layout_of_robomimic(made: Path, tmp_path: Path) -
                 np.testing.assert_array_equal(demo["next_obs"][name][:-1], values[1:])
         masks = {name.decode() for mask in file["mask"].values() for name in mask[()]}
         assert masks == set(demos)
+
+
+def with_lamp(folder: Path, lamp: float) -> Path:
+    """A scene of the wide hand with a lamp on its palm, which a joint of no finger turns."""
+    hand = SCENES.parent / "assets/hands/wide_four_finger"
+    folder.mkdir()
+    joint = """<joint name="lamp" type="revolute"><parent link="palm"/><child link="shade"/><axis xyz="0 0 1"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="shade"/></robot>"""
+    (folder / "hand.urdf").write_text((hand / "hand.urdf").read_text().replace("</robot>", joint))
+    held = f'base_link = "palm"\n\n[held]\nlamp = {lamp}\n'
+    (folder / "hand.toml").write_text((hand / "hand.toml").read_text().replace('base_link = "palm"\n', held))
+    scene = folder / "scene.toml"
+    text = (SCENES / "sphere_90x.toml").read_text()
+    scene.write_text(text.replace("../assets/hands/wide_four_finger/hand.toml", "hand.toml"))
+    return scene
+
+
+@pytest.mark.skipif(find_spec("h5py") is None, reason="SKIPPED: h5py is not installed")
+def test_exports_say_where_joints_of_no_finger_stand(made: Path, tmp_path: Path) -> None:
+    import h5py
+
+    def lit(lamp: float) -> Path:
+        scene = with_lamp(tmp_path / f"lamp_{lamp}", lamp)
+        text = text_of(episodes=2, block=2).replace(str(SCENES / "sphere_90x.toml"), str(scene))
+        assert make(specification_of(text, "dataset.toml"), scene.parent / "made", workers=1).solved >= 1
+        return scene.parent / "made"
+
+    folder = lit(0.3)
+    for episode in read_episodes(folder):
+        assert episode.plan().held_joints == {"lamp": 0.3}
+        assert frames_of(episode, FPS).layout.held_joints == (("lamp", 0.3),)
+    export_robomimic(read_episodes(folder), tmp_path / "lamp.hdf5", fps=FPS)
+    export_robomimic(read_episodes(made), tmp_path / "dark.hdf5", fps=FPS)
+    for name, held in (("lamp", {"lamp": 0.3}), ("dark", {})):
+        with h5py.File(tmp_path / f"{name}.hdf5") as file:
+            assert json.loads(file["data"].attrs["env_args"])["env_kwargs"]["held_joints"] == held
+    export_lerobot(read_episodes(folder), tmp_path / "lerobot", fps=FPS)
+    assert json.loads((tmp_path / "lerobot/meta/held_joints.json").read_text()) == {"lamp": 0.3}
+    export_lerobot(read_episodes(made), tmp_path / "lerobot_dark", fps=FPS)
+    assert not (tmp_path / "lerobot_dark/meta/held_joints.json").exists()
+    # One export is of one hand, in one posture.
+    both = [*read_episodes(folder), *read_episodes(lit(0.4))]
+    with pytest.raises(regrasp.InputError, match=r"D126.*'lamp': 0.4.*'lamp': 0.3"):
+        export_robomimic(iter(both), tmp_path / "both.hdf5", fps=FPS)
 
 
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="SKIPPED: MuJoCo is not installed")

@@ -22,6 +22,7 @@ def grasps() -> regrasp.GraspList:
 def test_a_list_is_found_judged_and_read_back(grasps: regrasp.GraspList, tmp_path: Path) -> None:
     assert len(grasps) == 4
     assert grasps.joints.shape == grasps.open_joints.shape == (4, len(grasps.joint_names))
+    assert grasps.held_joints == {}
     assert np.allclose(np.linalg.norm(grasps.poses[:, 3:], axis=1), 1.0)
     path = tmp_path / "grasps.json"
     grasps.save(path)

@@ -31,6 +31,7 @@ pub fn list(prepared: &Prepared, statistics: GraspStatistics, grasps: &[Found]) 
             base_link: hand.robot.links[hand.base.0].name.clone(),
             fingers: hand.fingers.iter().map(|finger| finger.name.clone()).collect(),
             joint_names: hand.joint_names(),
+            held_joints: hand.held_joints(),
         },
         object: ObjectRecord {
             name: object.name.clone(),

@@ -23,7 +23,7 @@ pub struct GraspMutant {
 }
 
 /// Names of all kinds of damage.
-pub const KINDS: [&str; 15] = [
+pub const KINDS: [&str; 18] = [
     "joint past its limit",
     "contact 1 mm off",
     "flipped normal",
@@ -39,6 +39,9 @@ pub const KINDS: [&str; 15] = [
     "hand below the support",
     "other mesh",
     "torque off",
+    "joint that stands still invented",
+    "joint that stands still left out",
+    "joint that stands still elsewhere",
 ];
 
 /// The list with only grasp `index`, broken in the way called `name`; none where this grasp cannot be broken so.
@@ -80,6 +83,18 @@ pub fn mutant(
             let (first, second) = (contacts[a].finger.clone(), contacts[b].finger.clone());
             (contacts[a].finger, contacts[b].finger) = (second, first);
             vec![Kind::ContactOffTip]
+        }
+        "joint that stands still invented" => {
+            list.hand.held_joints.insert("no_such_joint".into(), rng.uniform(-1.0, 1.0));
+            vec![Kind::WrongScene]
+        }
+        "joint that stands still left out" => {
+            list.hand.held_joints.pop_first()?;
+            vec![Kind::WrongScene]
+        }
+        "joint that stands still elsewhere" => {
+            *list.hand.held_joints.values_mut().next()? += rng.uniform(1e-6, 1e-3);
+            vec![Kind::WrongScene]
         }
         "friction above the scene's" => {
             list.promises.friction = object.friction * rng.uniform(1.001, 1.2);

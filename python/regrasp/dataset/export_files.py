@@ -45,12 +45,12 @@ def export_robomimic(episodes: Iterable[Episode], path: StrPath, *, fps: float =
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(target.name + ".part")
     masks: dict[str, list[bytes]] = {"train": [], "valid": []}
-    count, total, names = 0, 0, {}
+    count, total, names, held = 0, 0, {}, {}
     with h5py.File(part, "w", libver="latest", track_order=True) as file:
         data = file.create_group("data")
         for frames in all_frames(episodes, fps):
             demo, n, names = data.create_group(f"demo_{count}"), len(frames.time), frames.names()
-            row = frames.episode.row
+            row, held = frames.episode.row, dict(frames.layout.held_joints)
             demo.attrs.update(num_samples=n, task=row["task"], episode=row["episode"], key=row["key"], words=frames.episode.words)
             observed: dict[str, Any] = {
                 "joints": frames.joints,
@@ -73,7 +73,7 @@ def export_robomimic(episodes: Iterable[Episode], path: StrPath, *, fps: float =
             count += 1
             total += n
         data.attrs["total"] = total
-        kind = {"env_name": "regrasp", "type": 1, "env_kwargs": {"fps": fps, "names": names}}
+        kind = {"env_name": "regrasp", "type": 1, "env_kwargs": {"fps": fps, "names": names, "held_joints": held}}
         data.attrs["env_args"] = json.dumps(kind)
         for name, demos in masks.items():
             file.create_dataset(f"mask/{name}", data=np.array(demos, dtype="S16"), track_times=False)

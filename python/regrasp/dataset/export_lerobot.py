@@ -79,6 +79,8 @@ class _Writer:
     n_episodes: int = 0
     statistics: dict[str, _Statistics] = field(default_factory=dict[str, _Statistics])
     features: dict[str, Any] = field(default_factory=dict[str, Any])
+    held: dict[str, float] = field(default_factory=dict[str, float])
+    """Joints that stand still all along, and where."""
     n_frames: int = 0
     n_files: int = 0
     waiting: list[Any] = field(default_factory=list[Any])
@@ -104,6 +106,7 @@ class _Writer:
         }
         if not self.features:
             self.features = _features(frames, named)
+            self.held = dict(frames.layout.held_joints)
         about: dict[str, Any] = {
             "episode_index": index,
             "tasks": [frames.episode.words],
@@ -169,6 +172,9 @@ class _Writer:
         }
         stats = {name: statistics.to_json() for name, statistics in self.statistics.items()}
         (meta / "stats.json").write_text(json.dumps(stats, indent=1) + "\n", encoding="utf-8")
+        # The format has no place for them.
+        if self.held:
+            (meta / "held_joints.json").write_text(json.dumps(self.held, indent=1) + "\n", encoding="utf-8")
         # Last: a folder with this file is whole.
         (meta / "info.json").write_text(json.dumps(info, indent=1) + "\n", encoding="utf-8")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,8 @@ class Layout:
 
     joint_names: tuple[str, ...]
     fingers: tuple[str, ...]
+    held_joints: tuple[tuple[str, float], ...] = ()
+    """Joints that stand still all along, and where."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ def frames_of(episode: Episode, fps: float) -> Frames:
     joints = ref.joints.astype(np.float32)
     pose = np.concatenate([ref.object_position, ref.object_quat_wxyz[:, [1, 2, 3, 0]]], axis=1)
     return Frames(
-        layout=Layout(tuple(plan["joint_names"]), tuple(fingers)),
+        layout=Layout(tuple(plan["joint_names"]), tuple(fingers), _held(content)),
         episode=episode,
         time=np.arange(ref.n_ticks) / fps,
         joints=joints,
@@ -101,6 +104,13 @@ def frames_of(episode: Episode, fps: float) -> Frames:
     )
 
 
+def _held(content: dict[str, Any]) -> tuple[tuple[str, float], ...]:
+    """Of the hands of a plan file."""
+    hands: list[dict[str, Any]] = content["hands"]
+    positions = [item for hand in hands for item in cast("dict[str, float]", hand.get("held_joints", {})).items()]
+    return tuple(sorted(positions))
+
+
 def all_frames(episodes: Iterable[Episode], fps: float) -> Iterator[Frames]:
     """The frames of every episode. Raises `InputError` (D126) where hands differ: such exports have one row layout."""
     layout: Layout | None = None
@@ -108,7 +118,7 @@ def all_frames(episodes: Iterable[Episode], fps: float) -> Iterator[Frames]:
         frames = frames_of(episode, fps)
         if layout is not None and frames.layout != layout:
             name = episode.row["task"]
-            problem = f"has the joints {short(frames.layout)}, other episodes have {short(layout)}"
+            problem = f"has the joints {short(frames.layout)}, other episodes have {short(layout)}{_standing(frames.layout, layout)}"
             raise fault("D126", name, problem, fix="export one task at a time: --task NAME")
         layout = frames.layout
         yield frames
@@ -118,6 +128,13 @@ def short(layout: Layout) -> str:
     """Joint names, cut."""
     text = json.dumps(list(layout.joint_names))
     return text if len(text) < 80 else text[:77] + "..."
+
+
+def _standing(own: Layout, other: Layout) -> str:
+    """Which joints stand still, where that differs."""
+    if own.held_joints == other.held_joints:
+        return ""
+    return f"; still stand {dict(own.held_joints)}, there {dict(other.held_joints)}"
 
 
 __all__ = ["Frames", "Layout", "all_frames", "frames_of"]

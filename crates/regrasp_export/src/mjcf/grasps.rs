@@ -13,7 +13,6 @@ use regrasp_plan::plan::{
 };
 use regrasp_robot::Hand;
 use regrasp_scene::{GraspScene, Object};
-use std::collections::BTreeMap;
 
 /// Parts of the way between the open hand and the grasp at whose ends links are looked at.
 const MOMENTS: usize = 4;
@@ -114,7 +113,7 @@ fn plan_of(list: &GraspList) -> Plan {
             forces: None,
         },
         joint_names: list.hand.joint_names.clone(),
-        held_joints: BTreeMap::new(),
+        held_joints: list.hand.held_joints.clone(),
         fingers: list.hand.fingers.clone(),
         start: identity,
         way_poses: Vec::new(),

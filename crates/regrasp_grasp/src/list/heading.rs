@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The hand of a list.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HandRecord {
     /// Name of the robot file's robot.
@@ -16,6 +16,10 @@ pub struct HandRecord {
     pub fingers: Vec<String>,
     /// Names of its joints, in the order of every joint vector.
     pub joint_names: Vec<String>,
+    /// Its joints that no grasp moves, and where each of them stands, in radians or metres: independent joints that belong to no finger,
+    /// such as a wrist's. Absent where there are none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub held_joints: BTreeMap<String, f64>,
 }
 
 /// The object of a list.

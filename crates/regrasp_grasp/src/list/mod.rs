@@ -158,7 +158,8 @@ impl GraspList {
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let poses = self.stable_poses.iter().flat_map(StablePose::numbers);
         let grasps = self.grasps.iter().flat_map(ListedGrasp::numbers);
-        self.object.numbers().chain(self.promises.numbers()).chain(poses).chain(grasps)
+        let held = self.hand.held_joints.values().copied();
+        self.object.numbers().chain(self.promises.numbers()).chain(held).chain(poses).chain(grasps)
     }
 }
 

@@ -49,6 +49,7 @@ impl Reader<'_> {
         for (key, n_seen, most) in [
             ("hand", list.hand.fingers.len(), caps::FINGERS),
             ("hand", list.hand.joint_names.len(), caps::JOINTS),
+            ("hand", list.hand.held_joints.len(), caps::JOINTS),
             ("inputs", list.inputs.len(), caps::INPUTS),
             ("stable_poses", list.stable_poses.len(), caps::STABLE_POSES),
             ("grasps", list.grasps.len(), caps::GRASPS),
@@ -68,6 +69,16 @@ impl Reader<'_> {
         }
         for (key, names) in [("fingers", &list.hand.fingers), ("joint_names", &list.hand.joint_names)] {
             self.names(key, names);
+        }
+        for (name, position) in &list.hand.held_joints {
+            let steps = [Key("hand"), Key("held_joints"), Key(name)];
+            if let Some(fault) = fault_of_name(name) {
+                self.fail("V004", &steps, fault, GOOD_NAME);
+            } else if list.hand.joint_names.contains(name) {
+                let expected = "joints that no grasp moves";
+                self.fail("G708", &steps, format!("\"{name}\" is one of hand.joint_names too"), expected);
+            }
+            self.within(&steps, *position, [-caps::POSITION, caps::POSITION]);
         }
         for (i, input) in list.inputs.iter().enumerate() {
             let is_hex = |b: u8| b.is_ascii_digit() || (b'a'..=b'f').contains(&b);

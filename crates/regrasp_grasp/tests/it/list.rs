@@ -55,6 +55,7 @@ pub fn sample() -> GraspList {
             base_link: "palm".into(),
             fingers: vec!["thumb".into(), "index".into()],
             joint_names: vec!["a".into(), "b".into()],
+            held_joints: [("wrist".to_owned(), 0.25)].into(),
         },
         object: ObjectRecord { name: "mug".into(), mass: 0.1, center_of_mass: [0.0; 3], friction: 0.8 },
         promises: GraspPromises {
@@ -108,6 +109,9 @@ fn what_is_wrong_is_refused_at_its_place() {
         (swapped("\"normal_in_object\":[0.0,0.0,1.0]", "\"normal_in_object\":[0.0,0.0,2.0]"), "G705", "contacts[0]"),
         (swapped("\"finger\":\"thumb\"", "\"finger\":\"ring\""), "G708", "one of thumb, index"),
         (swapped("[\"a\",\"b\"]", "[\"a\",\"a\"]"), "G708", "used twice"),
+        (swapped("\"wrist\":0.25", "\"a\":0.25"), "G708", "hand.held_joints.a"),
+        (swapped("\"wrist\":0.25", "\"wrist\":1e9"), "G709", "hand.held_joints.wrist"),
+        (swapped("\"wrist\":0.25", "\"wr\\u0007ist\":0.25"), "V004", "U+0007"),
         (swapped("\"stable_poses\":[0]", "\"stable_poses\":[1]"), "G709", "below 1"),
         (swapped("\"margin\":0.05", "\"margin\":1e300"), "G709", "grasps[0].margin"),
         (swapped(&"0".repeat(64), "xyz"), "G709", "hex"),

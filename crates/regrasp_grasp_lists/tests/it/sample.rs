@@ -20,6 +20,22 @@ pub fn bundled(hand: &str, scene: &str) -> GraspScene {
     load_grasp_scene(&hand, &object, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// The wide hand with a lamp on its palm, which a joint of no finger turns, and the object of a bundled scene.
+pub fn with_lamp(scene: &str, lamp: f64) -> GraspScene {
+    let hand = root().join("assets/hands/wide_four_finger");
+    let own = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("lamp_{lamp}"));
+    std::fs::create_dir_all(&own).unwrap();
+    let joint = r#"<joint name="lamp" type="revolute"><parent link="palm"/><child link="shade"/><axis xyz="0 0 1"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="shade"/></robot>"#;
+    let urdf = std::fs::read_to_string(hand.join("hand.urdf")).unwrap();
+    std::fs::write(own.join("hand.urdf"), urdf.replace("</robot>", joint)).unwrap();
+    let file = std::fs::read_to_string(hand.join("hand.toml")).unwrap();
+    let held = format!("base_link = \"palm\"\n\n[held]\nlamp = {lamp}\n");
+    std::fs::write(own.join("hand.toml"), file.replace("base_link = \"palm\"\n", &held)).unwrap();
+    let object = ObjectSource::Scene(root().join("scenes").join(scene));
+    load_grasp_scene(&own.join("hand.toml"), &object, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
 /// A bundled hand with the bundled horse, which folds.
 pub fn with_horse(hand: &str) -> GraspScene {
     let hand = root().join("assets/hands").join(hand).join("hand.toml");

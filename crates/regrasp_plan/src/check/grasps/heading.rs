@@ -1,5 +1,6 @@
 //! Names, files and promises of a list.
 
+use crate::check::continuity::same_positions;
 use crate::check::model::CheckedHand;
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::check::{CheckSettings, Log, forces, promises};
@@ -23,6 +24,12 @@ pub(super) fn check_names(model: &CheckedHand, list: &GraspList, log: &mut Log) 
             log.push(Violation::new(Kind::WrongScene, message).subjects([list.hand.name.as_str()]));
             is_good = false;
         }
+    }
+    if !same_positions(&list.hand.held_joints, &model.held_joints) {
+        let [seen, expected] = [&list.hand.held_joints, &model.held_joints].map(|joints| format!("{joints:?}"));
+        let message = format!("the list has the joints that stand still {seen}, the hand has {expected}");
+        log.push(Violation::new(Kind::WrongScene, message).subjects([list.hand.name.as_str()]));
+        is_good = false;
     }
     is_good
 }

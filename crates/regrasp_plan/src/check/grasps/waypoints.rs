@@ -5,7 +5,6 @@ use crate::plan::{
 };
 use regrasp_geometry::Pose;
 use regrasp_grasp::list::{GraspList, ListedGrasp};
-use std::collections::BTreeMap;
 
 /// The list as a plan: one segment with one waypoint for each grasp. It is no plan that anybody could carry out.
 pub(super) fn plan_of(list: &GraspList) -> Plan {
@@ -47,7 +46,7 @@ pub(super) fn plan_of(list: &GraspList) -> Plan {
             }),
         },
         joint_names: list.hand.joint_names.clone(),
-        held_joints: BTreeMap::new(),
+        held_joints: list.hand.held_joints.clone(),
         fingers: list.hand.fingers.clone(),
         start: identity,
         asked: None,
