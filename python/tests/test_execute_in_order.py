@@ -13,7 +13,7 @@ import pytest
 import regrasp
 from regrasp._session import QueryTimes
 from regrasp.execute.in_order import Answer, Cancelled, InOrder
-from regrasp.execute.planning import ChargedPlanning
+from regrasp.execute.planning import ChargedPlanning, ThreadPlanning
 from regrasp.execute.sessions import ExecutorSessions
 from regrasp.execute.settings import ExecutorSettings
 
@@ -128,3 +128,34 @@ def test_legs_are_the_same_on_any_number_of_threads() -> None:
         assert ticket.search_seconds > 0.0 and ticket.check_seconds > 0.0 and np.isfinite(ticket.overhead_seconds)
     assert made[0] == made[1] == made[2]
     assert spans[0] == made[0][1] > spans[1] >= spans[2]
+
+
+def test_nobody_waits_for_a_search_that_was_dropped() -> None:
+    scene = regrasp.load_scene(SCENES / "sphere_90x.toml")
+    plan = regrasp.plan(scene, seed=1)
+    assert isinstance(plan, regrasp.Plan)
+    may_end, began = threading.Event(), threading.Event()
+
+    class Quick:
+        hand, times = scene.hands[0], None
+
+        def plan(self, *_: Any, **__: Any) -> Any:
+            assert began.wait(5)
+            return plan
+
+    class Slow(Quick):
+        def plan(self, *_: Any, **__: Any) -> Any:
+            began.set()
+            may_end.wait(5)
+            return plan
+
+    sessions: Any = [Quick(), Slow()]
+    start: Any = None
+    before = threading.active_count()
+    planning = ThreadPlanning(sessions, ExecutorSettings(choices=1), lambda plan, _: plan)
+    ticket = planning.ask(start, plan.goal, 0, 0.0)
+    assert ticket.done.wait(5) and planning.is_ready(ticket, 0.0) and not may_end.is_set()
+    assert ticket.answer is plan and ticket.prepared is plan
+    may_end.set()
+    planning.close()
+    assert threading.active_count() == before

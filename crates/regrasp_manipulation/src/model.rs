@@ -158,6 +158,17 @@ impl<'a> Model<'a> {
         self.view.object.keeps_farther_off_edges(at, self.settings.edge_margin)
     }
 
+    /// True where a finger may land: as far off the edges as the object asks for. Contacts of an observed start may be nearer, and a finger
+    /// that has left one does not come back to it.
+    pub fn may_land(&self, contact: &Contact) -> bool {
+        let object = self.view.object;
+        if object.edge_distance <= 0.0 {
+            return true;
+        }
+        let distance = object.surface.crease_distance(&object.surface.project(&contact.point_in_object));
+        distance >= object.edge_distance - ON_THE_SPOT
+    }
+
     /// True where a contact at `from` may roll to `to`: off the edges, and nearer to them than the margin allows only where it does not come
     /// nearer still. Contacts of an observed start may be nearer than the object asks for.
     pub fn may_roll(&self, from: &Contact, to: &SurfacePoint) -> bool {
@@ -432,8 +443,12 @@ fn object_body(object: &Object) -> Body {
 /// more, bananas and mugs 0.65 and less.
 const FOLDED: f64 = 0.8;
 
-/// By how much a contact that rolls along an edge may come nearer to it in a step, in metres: rounding.
-const ALONG_AN_EDGE: f64 = 1e-10;
+/// By how much a contact that rolls along an edge may come nearer to it in a step, in metres: steps leave some slip. After 500 of them the
+/// checker would see it.
+const ALONG_AN_EDGE: f64 = 2e-8;
+
+/// How far a point may be from itself when it is sought on the surface again, in metres.
+const ON_THE_SPOT: f64 = 1e-9;
 
 /// True where the mesh of `object` fills clearly less than its hull.
 fn folds(object: &Object) -> bool {

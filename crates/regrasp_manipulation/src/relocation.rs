@@ -95,6 +95,9 @@ pub fn relocate(
     rng: &mut Rng,
 ) -> Option<Vec<Coordinates>> {
     let model = workspace.model;
+    if to.contact.is_some_and(|contact| !model.may_land(contact)) {
+        return None;
+    }
     let placement = Placement::from(world_from_object);
     let mut may_go_around = true;
     for &height in &model.settings.lift_heights {

@@ -46,7 +46,8 @@ class InOrder:
     def __init__(self, ask: Ask, threads: int) -> None:
         self._ask = ask
         self._threads = threads
-        self._pool = ThreadPoolExecutor(threads, "regrasp-search") if threads > 1 else None
+        # Searches that were dropped end soon, but not at once: the next ones do not wait for them.
+        self._pool = ThreadPoolExecutor(2 * threads, "regrasp-search") if threads > 1 else None
         self._running: dict[int, _Running] = {}
         self.work = 0.0
         """Of all answers that were taken."""

@@ -165,8 +165,8 @@ class ExecutorSettings:
     """Where a leg of a sphere or ellipsoid went wrong on its way, the hand first takes hold of it anew, where it is, if the grasp that is left is
     weak: else the next leg begins with that, and slips sooner."""
     threads: int = 2
-    """Searches for a leg that run at once: while careful plans are sought, so are the next less careful ones. Plans do not depend on it,
-    only how soon they are there."""
+    """Searches for a leg that run at once: while careful plans are sought, so are the next less careful ones. Plans do not depend on it
+    (without ``time_limit``), only how soon they are there."""
     plan_attempts: int = 3
     """Seeds that are tried for one leg."""
     choices: int = 20

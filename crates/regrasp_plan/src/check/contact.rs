@@ -144,7 +144,7 @@ pub fn check_pads(model: &CheckedHand, plan: &Plan, log: &mut Log) {
 
 /// Every contact of the plan lies on the object's surface, with the surface's normal, away from its edges: on an edge any
 /// normal between those of its faces is one. Tracking crosses edges, so contacts there may be near. Where the query says how the hand
-/// was observed, a fingertip that was near an edge then may stay there until it lifts, and come no nearer.
+/// was observed, a fingertip that was near an edge then may be there until it lifts, and only go away from edges.
 pub fn check_contacts(
     object: &Object,
     query: Option<&Query>,
@@ -156,7 +156,7 @@ pub fn check_contacts(
     let mut seen = BTreeSet::new();
     let edges = Edges::of(&object.shape, object.crease_angle);
     let least = object.edge_distance - settings.surface_tolerance;
-    let mut observed = observed_near_edges(object, query, plan, &edges, settings.surface_tolerance);
+    let mut observed = observed_near_edges(object, query, model, plan, &edges, settings.surface_tolerance);
     for (s, segment) in plan.segments.iter().enumerate() {
         for (w, waypoint) in segment.waypoints.iter().enumerate() {
             for (f, state) in waypoint.contacts.iter().enumerate() {
@@ -192,36 +192,49 @@ pub fn check_contacts(
                 let edge = edges.distance(&Point::from(point), least);
                 if edge < nearest_allowed {
                     let (limit, who) = match observed[f] {
-                        Some(_) => (nearest_allowed, "it was observed at"),
+                        Some(_) => (nearest_allowed, "it was observed near one and may only go away, here to"),
                         None => (object.edge_distance, "the scene asks for"),
                     };
                     let message =
                         format!("the contact of finger \"{name}\" is {edge:.3e} m from an edge, {who} {limit:.3e}");
                     log.push(tell(Kind::ContactTooNearEdge, message, edge, limit));
                 }
+                // Whoever has gone away does not come back.
+                if let Some(allowed) = observed[f] {
+                    let gone_to = edge - settings.surface_tolerance;
+                    observed[f] = (gone_to < least).then_some(gone_to.max(allowed));
+                }
             }
         }
     }
 }
 
-/// For every finger that the query has observed nearer to an edge than the scene allows, but no nearer than may be: how near it was, less the
-/// tolerance. That the plan begins as it was observed is judged elsewhere.
+/// For every finger that was observed nearer to an edge than the scene allows, but no nearer than may be: how near it was, less the
+/// tolerance. Only plans that say what they were asked begin so; that they begin as the query has it is judged elsewhere.
 fn observed_near_edges(
     object: &Object,
     query: Option<&Query>,
+    model: &CheckedHand,
     plan: &Plan,
     edges: &Edges,
     tolerance: f64,
 ) -> Vec<Option<f64>> {
     let mut observed = vec![None; plan.fingers.len()];
-    let Some(GraspRequest::Posture { holds, .. }) = query.map(Query::start_grasp) else { return observed };
+    let Some(GraspRequest::Posture { holds, .. }) = query.filter(|_| plan.asked.is_some()).map(Query::start_grasp)
+    else {
+        return observed;
+    };
     let Some(first) = plan.segments.first().and_then(|segment| segment.waypoints.first()) else { return observed };
+    let world_from_object = Pose::from(&first.world_from_object);
     let least = object.edge_distance - tolerance;
-    for ((observed, contact), _) in observed.iter_mut().zip(&first.contacts).zip(holds).filter(|(_, holds)| **holds) {
-        let Some(point) = contact.point_in_object else { continue };
-        let distance = edges.distance(&Point::from(point), least);
-        let may_be = distance < least && distance >= object.least_observed_edge_distance() - tolerance;
-        *observed = may_be.then_some(distance - tolerance);
+    for (f, finger) in model.fingers.iter().enumerate().filter(|(f, _)| holds.get(*f) == Some(&true)) {
+        let Some(contact) = contact_of(&first.contacts[f]) else { continue };
+        let distance = edges.distance(&contact.point_in_object, least);
+        // The tip itself may be elsewhere than the plan says, within the tolerance of contacts.
+        let normal = world_from_object * contact.normal_in_object.into_inner();
+        let off = error_at(finger, first, f) - finger.misfit(&first.joints, &normal);
+        let is_far_enough = distance - off.max(0.0) >= object.least_observed_edge_distance() - tolerance;
+        observed[f] = (distance < least && is_far_enough).then_some(distance - tolerance);
     }
     observed
 }
