@@ -136,7 +136,7 @@ fn a_fingertip_that_came_to_rest_near_an_edge_goes_away_from_it_or_lifts() {
         // And one that goes away from the edge and comes back to where it was.
         let mut back_again = plan.clone();
         let mut ways = back_again.segments.iter_mut().flat_map(|segment| &mut segment.waypoints);
-        let begun = ways.next().unwrap().contacts[finger].clone();
+        let begun = ways.next().unwrap().contacts[finger];
         let held = ways.map(|waypoint| &mut waypoint.contacts[finger]).take_while(|c| c.mode != ContactMode::Free);
         let gone = |contact: &&mut _| edge_distance_of(point_of(contact)) > first + 1e-4;
         if let Some(contact) = held.skip_while(|contact| !gone(contact)).nth(1) {
