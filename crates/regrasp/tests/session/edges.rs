@@ -1,24 +1,24 @@
 //! Starts whose fingertips have come to rest nearer to an edge than the scene lets plans put them. Distances are those of the box itself: a
 //! point lies on one pair of faces, and an edge is where it would lie on a second one.
 
+use crate::{observation, own_plan, path, session};
+use regrasp::Failure;
 use regrasp::base::Budget;
 use regrasp::geometry::Pose;
 use regrasp::plan::ContactMode;
 use regrasp::plan::check::{CheckSettings, ViolationKind};
 use regrasp::plan::plan::{ContactState, Plan, Waypoint};
-use regrasp::planners::in_hand::starting::{Observation, ProjectionLimits};
+use regrasp::planners::in_hand::starting::ProjectionLimits;
 use regrasp::robot::LoadOptions;
 use regrasp::scene::{LoadedScene, load_scene_text};
 use regrasp::session::Session;
-use regrasp::{Failure, InHandSettings};
-use std::path::Path;
 
 const HALF: [f64; 3] = [0.025, 0.025, 0.030];
 const EDGE_DISTANCE: f64 = 0.004;
 
 /// The box of 50 x 50 x 60 mm; contacts keep so far from its edges.
 fn loaded(edge_distance: f64) -> LoadedScene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/box_90x.toml");
+    let path = path("box_90x.toml");
     let text = std::fs::read_to_string(&path).unwrap();
     let text = text.replace("friction = 0.8", &format!("friction = 0.8\nedge_distance = {edge_distance}"));
     load_scene_text(&path, text.into_bytes(), &LoadOptions::default()).unwrap()
@@ -40,33 +40,20 @@ fn edge_distances(waypoint: &Waypoint) -> Vec<Option<f64>> {
     held.map(|point| point.map(edge_distance_of)).collect()
 }
 
-/// A plan of a hand that puts its fingertips as near to edges as 0.2 mm, and its waypoints at which one is between `near` of the given
-/// distances.
-fn careless(seed: u64, near: [f64; 2]) -> (Plan, Vec<Waypoint>) {
+/// Waypoints of a plan that may put fingertips as near to edges as 0.2 mm: those at which the nearest one is between the distances `near`.
+fn careless(seed: u64, near: [f64; 2]) -> Vec<Waypoint> {
     let loaded = loaded(0.0002);
-    let query = loaded.task().query(seed);
-    let (query, settings) = (query.as_in_hand().unwrap(), InHandSettings::default());
-    let view = regrasp::HandView::of(&loaded.manipulation());
-    let plan = regrasp::plan_in_hand(&view, query, &settings, seed, &Budget::work(2_000_000), &|_| {}).unwrap();
+    let plan = own_plan(&loaded, seed);
+    assert_eq!(kinds(&session(&loaded), &plan), [], "seed {seed}");
     let is_near = |waypoint: &&Waypoint| {
         let nearest = edge_distances(waypoint).into_iter().flatten().fold(f64::INFINITY, f64::min);
         near[0] < nearest && nearest < near[1]
     };
     let ends = plan.segments.iter().flat_map(|segment| [&segment.waypoints[0], segment.waypoints.last().unwrap()]);
-    let found = ends.filter(is_near).cloned().collect();
-    (plan, found)
+    ends.filter(is_near).cloned().collect()
 }
 
-fn observation(waypoint: &Waypoint) -> Observation {
-    Observation {
-        world_from_object: Pose::from(&waypoint.world_from_object),
-        joints: waypoint.joints.clone(),
-        velocities: None,
-        presses: None,
-    }
-}
-
-/// A plan from one of `waypoints` back to where the task begins.
+/// A plan from `waypoint` to `goal`.
 fn back(session: &Session, goal: &Pose, waypoint: &Waypoint, seed: u64) -> Result<Plan, Failure> {
     let start = session.project(&observation(waypoint), &ProjectionLimits::default())?;
     session.plan(&start, goal, seed, &Budget::work(2_000_000), &|_| {})
@@ -79,11 +66,11 @@ fn kinds(session: &Session, plan: &Plan) -> Vec<ViolationKind> {
 #[test]
 fn a_fingertip_that_came_to_rest_near_an_edge_goes_away_from_it_or_lifts() {
     let strict = loaded(EDGE_DISTANCE);
-    let session = Session::open(&strict, None, InHandSettings::default()).unwrap();
+    let session = session(&strict);
     let query = strict.task().query(0);
     let (mut n_plans, mut n_rolled, mut n_nearer, mut n_landed, mut n_back) = (0, 0, 0, 0, 0);
     for seed in 0..30 {
-        let (_, near) = careless(seed, [0.25 * EDGE_DISTANCE, EDGE_DISTANCE - 2e-4]);
+        let near = careless(seed, [0.25 * EDGE_DISTANCE, EDGE_DISTANCE - 2e-4]);
         let Some(waypoint) = near.first() else { continue };
         let Ok(plan) = back(&session, query.start(), waypoint, seed) else { continue };
         n_plans += 1;
@@ -164,10 +151,10 @@ fn towards_the_edge(point: &mut [f64; 3], distance: f64) {
 #[test]
 fn a_fingertip_on_the_edge_itself_is_no_start() {
     let strict = loaded(EDGE_DISTANCE);
-    let session = Session::open(&strict, None, InHandSettings::default()).unwrap();
+    let session = session(&strict);
     let mut n_refused = 0;
     for seed in 0..12 {
-        for waypoint in careless(seed, [0.0, 0.25 * EDGE_DISTANCE - 1e-4]).1 {
+        for waypoint in careless(seed, [0.0, 0.25 * EDGE_DISTANCE - 1e-4]) {
             // Without room to move the fingertip away.
             let limits = ProjectionLimits { distance: 1e-5, turn: 1e-3, ..ProjectionLimits::default() };
             let failure = session.project(&observation(&waypoint), &limits).unwrap_err();

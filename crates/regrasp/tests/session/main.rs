@@ -1,5 +1,8 @@
 //! Sessions: starts from observed states, plans that bring their query, and the checker that judges them from the file alone.
 
+/// Starts near edges.
+mod edges;
+
 use regrasp::base::{Budget, Rng};
 use regrasp::geometry::{Pose, Vector};
 use regrasp::plan::check::{CheckSettings, OwnQuery, ViolationKind, check_files};
