@@ -17,7 +17,7 @@ from regrasp.execute.estimate import PoseFilter  # noqa: E402
 from regrasp.execute.goals import between, towards  # noqa: E402
 from regrasp.execute.monitor import Monitor, Trigger  # noqa: E402
 from regrasp.execute.planning import ChargedPlanning, Ticket  # noqa: E402
-from regrasp.execute.settings import PLANNER, careful_settings  # noqa: E402
+from regrasp.execute.settings import ANEW, PLANNER, careful_settings  # noqa: E402
 from regrasp.simulate.reference import quat_exp, quat_product  # noqa: E402
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -111,19 +111,22 @@ class Strict:
         return self._session.project(elsewhere, *args[1:], distance=distance, turn=turn, **more)
 
 
-@pytest.mark.parametrize(("least", "status"), [(0.0035, "done"), (0.0045, "gave_up")])
+@pytest.mark.parametrize(("least", "status"), [(0.0035, "done"), (0.007, "done"), (0.0085, "gave_up")])
 def test_a_start_farther_off_is_good_enough_before_the_hand_gives_up(least: float, status: str) -> None:
     scene = regrasp.load_scene(SCENES / "sphere_90x.toml")
     plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
     strict: Any = Strict(regrasp.Session(scene, settings=PLANNER), least)
-    settings = ExecutorSettings(anytime=False)
+    settings = ExecutorSettings(anytime=False, most_retreats=0)
     log = Executor(strict, plant, settings).run(turns(plant.pose, count=1, seed=3))
     assert log.status == status, log.message
-    usual, turned, wide = (settings.project_distance, settings.project_turn), (settings.project_distance, 0.08), (0.004, 0.08)
-    assert set(strict.asked) == {usual, turned, wide} and strict.asked == sorted(strict.asked), strict.asked
-    # The usual limits are asked again and again, for as long as the hand is patient.
+    # The usual limits are asked again and again, for as long as the hand is patient; then angles grow first.
+    growing = [(0.002, 0.04), (0.002, 0.08), (0.004, 0.08), (0.002, 0.16), (0.008, 0.16)]
+    assert settings.project_distance == 0.002 and settings.project_turn == 0.04
+    first = [growing.index(asked) for asked in dict.fromkeys(strict.asked)]
+    assert first == list(range(3 if least < 0.004 else 5)), strict.asked
+    assert strict.asked.count(growing[0]) > 3 and all(strict.asked.count(asked) == 1 for asked in growing[3:] if asked in strict.asked)
     events = [event for event in log.events if event.kind == "no_start"]
-    assert len(events) == 1 and len(strict.asked) > 3
+    assert len(events) == 1
     assert plant.touching() >= 2
 
 
@@ -156,6 +159,30 @@ def test_where_a_leg_went_wrong_a_round_object_is_taken_hold_of_anew(
         assert Told.tickets[2].goal is goal
     else:
         assert second.goal is goal
+
+
+@pytest.mark.parametrize(("name", "careful"), [("sphere_90x", False), ("sphere_90x", True), ("box_90x", False)])
+def test_a_round_object_is_taken_hold_of_anew_before_a_leg_that_is_not_careful(name: str, careful: bool) -> None:
+    scene = regrasp.load_scene(SCENES / f"{name}.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    goal = next(turns(plant.pose, count=1, seed=3, largest=0.5))
+    Told.tickets = []
+    first = [regrasp.Session(scene, settings=careful_settings(scene.objects[0])[1])] if careful else []
+    anew = regrasp.Session(scene, settings=ANEW)
+    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, ExecutorSettings(anytime=False), planning=Told, careful=first, anew=[anew])
+    log = executor.run([goal])
+    assert log.n_reached == 1 and not log.events
+    asked = [angle_between(ticket.start.world_from_object.quat_xyzw, ticket.goal.quat_xyzw) for ticket in Told.tickets]
+    if name == "sphere_90x" and not careful:
+        regrip = Told.tickets[1]
+        assert 0.0 < asked[1] < 0.01 < asked[0] and isinstance(regrip.answer, regrasp.Plan)
+        assert regrip.answer.settings["end_margin"] == 0.03 and regrip.answer.settings["forces"]["squeeze"] == 6.0
+        # Only once for a goal, and only where the grasp changes: then the leg is planned again from there.
+        is_changed = regrip.answer.statistics["relocations"] > 0
+        assert len(log.plans) == 1 + is_changed and len(asked) == 2 + is_changed
+        assert log.plans[-1].settings["friction_margin"] == 1.5
+    else:
+        assert len(asked) == len(log.plans) == 1
 
 
 def test_where_a_grasp_is_weak_it_is_changed_while_the_object_hardly_moves() -> None:
@@ -248,6 +275,89 @@ def test_a_leg_that_went_on_often_enough_does_not_go_on_again(monkeypatch: pytes
     monkeypatch.setattr(Executor, "_comes_back", lambda *_: False)
     log = executor.run([goal])
     assert log.status == "gave_up" and len([event for event in log.events if event.answer == "resume"]) == 2
+    assert plant.touching() >= 2
+
+
+@pytest.mark.parametrize("helps", [True, False])
+def test_without_a_start_the_hand_goes_back_to_where_the_finger_had_lifted(
+    helps: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    scene = regrasp.load_scene(SCENES / "box_90x.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    wanted = regrasp.plan(scene, seed=1)
+    assert isinstance(wanted, regrasp.Plan)
+    barren: Any = Barren(regrasp.Session(scene, settings=PLANNER), "start")
+    ticks: list[int] = []
+
+    def listen(event: Any) -> None:
+        if getattr(event, "answer", "") == "back":
+            ticks.append(executor._k)
+            barren.is_barren = not helps
+
+    executor = Executor(barren, plant, ExecutorSettings(anytime=False, patience=0.3), listener=listen)
+    look = Monitor.look
+    stopped: list[int] = []
+
+    def slips_in_the_air(own: Monitor, k: int, senses: Any, targets: Any) -> Trigger | None:
+        leg = executor._leg
+        assert leg is not None
+        if not stopped and k > 60 and not leg.ref.holds[k - 60 : k + 1].all(axis=1).any():
+            stopped.append(k)
+            barren.is_barren = True
+            return Trigger("slip", "said by the test")
+        return look(own, k, senses, targets)
+
+    monkeypatch.setattr(Monitor, "look", slips_in_the_air)
+    monkeypatch.setattr(Monitor, "is_sudden", property(lambda _: False))
+    monkeypatch.setattr(Executor, "_may_go_on", lambda _: False)
+    monkeypatch.setattr(Executor, "_comes_back", lambda *_: False)
+    log = executor.run([wanted.goal])
+    leg = executor._leg
+    assert len(stopped) == 1 and leg is not None and plant.touching() >= 2
+    if helps:
+        assert [(event.kind, event.answer) for event in log.events] == [("slip", "replan"), ("no_start", "hold"), ("no_start", "back")]
+        assert log.n_reached == 1 and len(log.plans) == 2
+        log.page(tmp_path / "run.html")
+        assert "go back" in (tmp_path / "run.html").read_text()
+        return
+    assert log.status == "gave_up" and 1 <= len(ticks) <= ExecutorSettings.most_retreats
+    for begun, ended in zip(ticks, [*ticks[1:], executor._k]):
+        # A finger holds again that did not, and at no time do fewer fingers hold than the plan has while it hands over.
+        assert ended < begun and (leg.ref.holds[ended] & ~leg.ref.holds[begun]).any()
+        assert leg.ref.holds[ended].sum() >= leg.ref.holds[begun].sum()
+
+
+@pytest.mark.parametrize(
+    ("phases", "back_to"),
+    [
+        # Tick at which each phase begins, and fingers that hold from then on.
+        ([(0, "1111"), (50, "0111")], 49),
+        # Another finger has taken over: that happens within some hundredths of a second.
+        ([(0, "1011"), (50, "0011"), (65, "0111")], 49),
+        ([(0, "1011"), (50, "1111"), (65, "0111")], 64),
+        # Here it took longer, so the step before is another one.
+        ([(0, "1011"), (50, "0011"), (80, "0111")], None),
+        # No finger has lifted: one has landed, or nothing happened.
+        ([(0, "0111"), (50, "1111")], None),
+        ([(0, "0111")], None),
+    ],
+)
+def test_going_back_ends_before_the_finger_lifted(phases: list[tuple[int, str]], back_to: int | None) -> None:
+    scene = regrasp.load_scene(SCENES / "box_90x.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant)
+    wanted = regrasp.plan(scene, seed=1)
+    assert isinstance(wanted, regrasp.Plan)
+    executor.run([wanted.goal])
+    leg, last = executor._leg, executor._k
+    assert leg is not None and last > 200
+    for first, holds in phases:
+        leg.ref.holds[first:] = [finger == "1" for finger in holds]
+    executor._stopped = Monitor(leg, ExecutorSettings(), executor._senses.joints)
+    assert executor._retreat("said by the test") == (back_to is not None)
+    assert executor._k == (last if back_to is None else back_to)
+    # What went wrong is not gone on with.
+    assert (executor._stopped is None) == (back_to is not None)
     assert plant.touching() >= 2
 
 

@@ -23,11 +23,13 @@ from .monitor import HOLDING, Monitor, Trigger, pose_error, why_gone
 from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
 from .plant import Plant
 from .sessions import ExecutorSessions
-from .settings import ROUND, ExecutorSettings
+from .settings import CAREFUL_ROUND, ROUND, ExecutorSettings
 from .steering import Steering
 
 #: Trouble that may pass while the hand holds: a push moves the object, and the fingers bring it back.
 PASSING = frozenset({"deviation", "lost_contact", "slip"})
+#: Fingers that land and lift within so long of each other do so in one step, in seconds: plans have 0.06 between the two.
+HAND_OVER_TIME = 0.1
 #: The object turns by so much while it is taken hold of anew, in radians.
 REGRIP_TURN = 0.002
 
@@ -144,7 +146,7 @@ class Executor(Steering):
         settings = self._settings
         started, motion_time, why_not = self._senses.time, 0.0, ""
         quat = np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
-        is_reached = has_missed = False
+        is_reached = has_missed = has_regripped = False
         ahead: Ticket | None = None
         # A leg to another goal does not go on, unless nothing else is left.
         self._is_trusted = False
@@ -165,6 +167,14 @@ class Executor(Steering):
                     if self._anew and settings.replanning and attempt < most:
                         motion_time += self._regrip(goal, self._anew)
                     continue
+                if self._anew and self._is_round and settings.regrips_round and not (has_missed or has_regripped) and _is_weak(ticket.answer):
+                    # Where no careful plan is found, the grasp is likely to be weak.
+                    has_regripped = True
+                    taken = self._regrip(goal, self._anew)
+                    if taken > 0.0:
+                        motion_time += taken
+                        attempt -= 1
+                        continue
                 self._begin(ticket, ticket is made_ahead)
                 following = upcoming.peek() if settings.anytime and not (settings.replanning and attempt > 1) else None
                 ahead = None if following is None else self._ask_ahead(ticket.answer, following)
@@ -293,7 +303,7 @@ class Executor(Steering):
         """
         settings = self._settings
         since = self._senses.time
-        told, reach = False, 1.0
+        told, reach, n_retreats = False, 1.0, 0
         while True:
             self._hold_for(settings.rest_time)
             senses = self._senses
@@ -314,11 +324,14 @@ class Executor(Steering):
                 # The object is where the leg has it, and held: going on does less harm than ending here.
                 if self._may_go_on():
                     raise GoOn("no_start", message)
+                if n_retreats < settings.most_retreats and self._retreat(message):
+                    since, reach, n_retreats = senses.time, 1.0, n_retreats + 1
+                    continue
                 n_felt = None if senses.forces is None else int((senses.forces > settings.lost_force).sum())
                 lost = "no finger touches" in message if n_felt is None else n_felt < HOLDING
                 raise GiveUp("lost" if lost else "gave_up", f"no start: {message}")
             # Before the hand gives up, a start farther off is good enough: the fingers go there from where they are.
-            reach = settings.last_reach
+            reach = min(2.0 * reach, settings.last_reach)
 
     def _start_near(self, reach: float) -> tuple[Start | None, str]:
         """The start nearest to what is seen, within so many times the usual limits, or why there is none."""
@@ -357,11 +370,41 @@ class Executor(Steering):
         holds, last = leg.ref.holds[self._k], self._k
         goal = max(0, self._k - round(settings.back_off_time / self._plant.tick))
         while self._k > goal and bool((leg.ref.holds[self._k - 1] == holds).all()):
-            self._k -= 1
-            faults = self._tick(moves=False, state="hold")
-            if faults:
-                self._outlast(faults)
+            self._step_back()
         return self._k < last
+
+    def _retreat(self, message: str) -> bool:
+        """Goes back on the leg to before the last finger had lifted, wherever the object is by now: that finger takes hold again where it
+        did, and one that had landed since lifts. False where no finger has lifted on this leg."""
+        leg = self._leg
+        if leg is None:
+            return False
+        all_holds, k = leg.ref.holds, self._k
+        now = all_holds[k]
+        while True:
+            # The first tick of this phase; the phase before ends where a finger lifted or landed.
+            first = k
+            while first > 0 and bool((all_holds[first - 1] == all_holds[k]).all()):
+                first -= 1
+            # One finger may land some hundredths of a second after another one has lifted: that is one step.
+            if first == 0 or (k != self._k and (k + 1 - first) * self._plant.tick > HAND_OVER_TIME):
+                return False
+            k = first - 1
+            if bool((all_holds[k] & ~now).any()):
+                break
+        self._event("no_start", message, "back")
+        while self._k > k:
+            self._step_back()
+        # It went wrong here, and would again.
+        self._stopped = None
+        return True
+
+    def _step_back(self) -> None:
+        """One tick back on the leg."""
+        self._k -= 1
+        faults = self._tick(moves=False, state="hold")
+        if faults:
+            self._outlast(faults)
 
     def _prepare(self, plan: Plan, speed: float) -> Leg:
         if self._rig is None:
@@ -470,6 +513,11 @@ class Executor(Steering):
             if senses.time - good_since >= settings.resume_after:
                 return True
         return False
+
+
+def _is_weak(plan: Plan) -> bool:
+    """True where the plan is none of the careful ones."""
+    return bool(plan.settings["friction_margin"] < CAREFUL_ROUND["friction_margin"])
 
 
 def _no_plan(ticket: Ticket) -> str:

@@ -28,7 +28,7 @@ class Event:
     """docs/reference/run-format.md lists the kinds."""
     message: str
     answer: str
-    """``hold``, ``resume``, ``replan``, ``ignore``, ``give_up`` or ``none``."""
+    """``hold``, ``resume``, ``back``, ``replan``, ``ignore``, ``give_up`` or ``none``."""
     goal: int
     leg: int
 

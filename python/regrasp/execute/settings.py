@@ -41,8 +41,8 @@ CLEAR_ROUND: dict[str, Any] = {**CAREFUL_ROUND, "clearance": 0.0006}
 LOOSE: dict[str, Any] = {**PLANNER, "clearance": 2e-5, "closure_margin": 0.001}
 #: ``PLANNER`` with more room for friction and a firmer grip: legs are planned with these first where ``grip`` says so. Origin: pushes of 4 N on the bundled box.
 FIRM: dict[str, Any] = {**PLANNER, "friction_margin": 2.0, "forces": {"squeeze": 12.0, "normal_force": [2.0, 30.0]}}
-#: ``PLANNER`` with a better grasp at the end: so the hand takes hold of the object anew, where no plan leads on from the present grasp.
-ANEW: dict[str, Any] = {**PLANNER, "end_margin": 0.03}
+#: ``FIRMER`` with a better grasp at the end: so the hand takes hold of the object anew, where no plan leads on from the present grasp.
+ANEW: dict[str, Any] = {**FIRMER, "end_margin": 0.03}
 
 #: Shapes that are round everywhere.
 ROUND = frozenset({"sphere", "ellipsoid"})
@@ -147,8 +147,10 @@ class ExecutorSettings:
     """How far a start may be from what was observed,"""
     project_turn: float = 0.04
     """and by which angle, of the object and of any joint."""
-    last_reach: float = 2.0
-    """Where no such start is found for ``patience``, it may be this many times as far, before the hand gives up."""
+    last_reach: float = 4.0
+    """Where no such start is found for ``patience``, it may be twice as far, then up to this many times, before the hand gives up."""
+    most_retreats: int = 2
+    """Where there is none of these either, the hand goes back on its leg to before the last finger lifted, so often at most, and looks again."""
     attempts: int = 4
     """Legs that are tried for one goal."""
     again_speed: float = 1.0
@@ -162,8 +164,8 @@ class ExecutorSettings:
     new leg pushed it as far beyond on the other side. Against that these two help, together with the usual grip, which legs after a miss
     have (docs/benchmarks/execute.md). On other shapes the share was not measured, and slow legs did harm where fingers relocate."""
     regrips_round: bool = True
-    """Where a leg of a sphere or ellipsoid went wrong on its way, the hand first takes hold of it anew, where it is, if the grasp that is left is
-    weak: else the next leg begins with that, and slips sooner."""
+    """Where a leg of a sphere or ellipsoid went wrong on its way, or no careful plan is found, the hand first takes hold of it anew, where it is,
+    if the grasp that is left is weak: else the next leg begins with that, and slips sooner."""
     threads: int = 2
     """Searches for a leg that run at once: while careful plans are sought, so are the next less careful ones. Plans do not depend on it
     (without ``time_limit``), only how soon they are there."""

@@ -84,6 +84,8 @@ pub enum Answer {
     Hold,
     /// The hand held until the object had come back, and the leg went on.
     Resume,
+    /// The hand went back on the leg to before a finger had lifted.
+    Back,
     /// A new plan was made.
     Replan,
     /// The observation was left out.
@@ -255,6 +257,7 @@ impl Answer {
         match self {
             Answer::Hold => "hold",
             Answer::Resume => "hold, then go on",
+            Answer::Back => "go back",
             Answer::Replan => "replan",
             Answer::Ignore => "ignore",
             Answer::GiveUp => "give up",
@@ -266,7 +269,7 @@ impl Answer {
     fn color(self) -> &'static str {
         match self {
             Answer::Replan => "#d55e00",
-            Answer::Hold => "#e69f00",
+            Answer::Hold | Answer::Back => "#e69f00",
             Answer::GiveUp => "#c1121f",
             Answer::Resume | Answer::Ignore | Answer::None => "#888888",
         }
