@@ -488,8 +488,9 @@ class Executor(Steering):
                 may_pass = trigger.kind in PASSING and resumed < settings.most_resumes
                 may_pass = may_pass and (trigger.kind != "deviation" or monitor.is_sudden)
                 if not (may_pass and self._comes_back(monitor)):
-                    # A leg that goes wrong again after it went on is not to be trusted.
-                    self._stopped, self._is_trusted = monitor, first == 0
+                    # A leg that goes wrong again after it went on is not to be trusted; one that does so at once does not go on again.
+                    is_at_once = self._times_gone_on > 0 and (self._k - first) * self._plant.tick < settings.least_progress
+                    self._stopped, self._is_trusted = None if is_at_once else monitor, first == 0
                     return trigger
                 resumed += 1
                 self._event(trigger.kind, trigger.message, "resume")

@@ -106,7 +106,9 @@ class ExecutorSettings:
     sudden_within: float = 0.25
     """Where an object drifts off for longer than this, nothing comes back by itself: the hand does not wait."""
     most_resumes: int = 5
-    """A leg goes on again so often."""
+    """A leg goes on again so often,"""
+    least_progress: float = 0.5
+    """but not where it goes wrong again sooner than after so long."""
     slip_distance: float = 0.003
     """A fingertip that has moved so far over the object since it landed, beyond what is planned, slips."""
     slip_round: float = 0.00195
