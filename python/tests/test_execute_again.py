@@ -17,7 +17,7 @@ from regrasp.execute.estimate import PoseFilter  # noqa: E402
 from regrasp.execute.goals import between, towards  # noqa: E402
 from regrasp.execute.monitor import Monitor, Trigger  # noqa: E402
 from regrasp.execute.planning import ChargedPlanning, Ticket  # noqa: E402
-from regrasp.execute.settings import ANEW, PLANNER, careful_settings  # noqa: E402
+from regrasp.execute.settings import PLANNER, careful_settings  # noqa: E402
 from regrasp.simulate.reference import quat_exp, quat_product  # noqa: E402
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -159,30 +159,6 @@ def test_where_a_leg_went_wrong_a_round_object_is_taken_hold_of_anew(
         assert Told.tickets[2].goal is goal
     else:
         assert second.goal is goal
-
-
-@pytest.mark.parametrize(("name", "careful"), [("sphere_90x", False), ("sphere_90x", True), ("box_90x", False)])
-def test_a_round_object_is_taken_hold_of_anew_before_a_leg_that_is_not_careful(name: str, careful: bool) -> None:
-    scene = regrasp.load_scene(SCENES / f"{name}.toml")
-    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
-    goal = next(turns(plant.pose, count=1, seed=3, largest=0.5))
-    Told.tickets = []
-    first = [regrasp.Session(scene, settings=careful_settings(scene.objects[0])[1])] if careful else []
-    anew = regrasp.Session(scene, settings=ANEW)
-    executor = Executor(regrasp.Session(scene, settings=PLANNER), plant, ExecutorSettings(anytime=False), planning=Told, careful=first, anew=[anew])
-    log = executor.run([goal])
-    assert log.n_reached == 1 and not log.events
-    asked = [angle_between(ticket.start.world_from_object.quat_xyzw, ticket.goal.quat_xyzw) for ticket in Told.tickets]
-    if name == "sphere_90x" and not careful:
-        regrip = Told.tickets[1]
-        assert 0.0 < asked[1] < 0.01 < asked[0] and isinstance(regrip.answer, regrasp.Plan)
-        assert regrip.answer.settings["end_margin"] == 0.03 and regrip.answer.settings["forces"]["squeeze"] == 6.0
-        # Only once for a goal, and only where the grasp changes: then the leg is planned again from there.
-        is_changed = regrip.answer.statistics["relocations"] > 0
-        assert len(log.plans) == 1 + is_changed and len(asked) == 2 + is_changed
-        assert log.plans[-1].settings["friction_margin"] == 1.5
-    else:
-        assert len(asked) == len(log.plans) == 1
 
 
 def test_where_a_grasp_is_weak_it_is_changed_while_the_object_hardly_moves() -> None:

@@ -23,7 +23,7 @@ from .monitor import HOLDING, Monitor, Trigger, pose_error, why_gone
 from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
 from .plant import Plant
 from .sessions import ExecutorSessions
-from .settings import CAREFUL_ROUND, ROUND, ExecutorSettings
+from .settings import ROUND, ExecutorSettings
 from .steering import Steering
 
 #: Trouble that may pass while the hand holds: a push moves the object, and the fingers bring it back.
@@ -146,7 +146,7 @@ class Executor(Steering):
         settings = self._settings
         started, motion_time, why_not = self._senses.time, 0.0, ""
         quat = np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
-        is_reached = has_missed = has_regripped = False
+        is_reached = has_missed = False
         ahead: Ticket | None = None
         # A leg to another goal does not go on, unless nothing else is left.
         self._is_trusted = False
@@ -167,14 +167,6 @@ class Executor(Steering):
                     if self._anew and settings.replanning and attempt < most:
                         motion_time += self._regrip(goal, self._anew)
                     continue
-                if self._anew and self._is_round and settings.regrips_round and not (has_missed or has_regripped) and _is_weak(ticket.answer):
-                    # Where no careful plan is found, the grasp is likely to be weak.
-                    has_regripped = True
-                    taken = self._regrip(goal, self._anew)
-                    if taken > 0.0:
-                        motion_time += taken
-                        attempt -= 1
-                        continue
                 self._begin(ticket, ticket is made_ahead)
                 following = upcoming.peek() if settings.anytime and not (settings.replanning and attempt > 1) else None
                 ahead = None if following is None else self._ask_ahead(ticket.answer, following)
@@ -514,11 +506,6 @@ class Executor(Steering):
             if senses.time - good_since >= settings.resume_after:
                 return True
         return False
-
-
-def _is_weak(plan: Plan) -> bool:
-    """True where the plan is none of the careful ones."""
-    return bool(plan.settings["friction_margin"] < CAREFUL_ROUND["friction_margin"])
 
 
 def _no_plan(ticket: Ticket) -> str:

@@ -166,8 +166,8 @@ class ExecutorSettings:
     new leg pushed it as far beyond on the other side. Against that these two help, together with the usual grip, which legs after a miss
     have (docs/benchmarks/execute.md). On other shapes the share was not measured, and slow legs did harm where fingers relocate."""
     regrips_round: bool = True
-    """Where a leg of a sphere or ellipsoid went wrong on its way, or no careful plan is found, the hand first takes hold of it anew, where it is,
-    if the grasp that is left is weak: else the next leg begins with that, and slips sooner."""
+    """Where a leg of a sphere or ellipsoid went wrong on its way, the hand first takes hold of it anew, where it is, if the grasp that is left is
+    weak: else the next leg begins with that, and slips sooner."""
     threads: int = 2
     """Searches for a leg that run at once: while careful plans are sought, so are the next less careful ones. Plans do not depend on it
     (without ``time_limit``), only how soon they are there."""
