@@ -301,7 +301,7 @@ def test_without_a_start_the_hand_goes_back_to_where_the_finger_had_lifted(
         return
     assert log.status == "gave_up" and 1 <= len(ticks) <= ExecutorSettings.most_retreats
     for begun, ended in zip(ticks, [*ticks[1:], executor._k]):
-        # A finger holds again that did not, and at no time do fewer fingers hold than the plan has while it hands over.
+        # A finger holds again that did not, and no fewer hold than did.
         assert ended < begun and (leg.ref.holds[ended] & ~leg.ref.holds[begun]).any()
         assert leg.ref.holds[ended].sum() >= leg.ref.holds[begun].sum()
 

@@ -28,7 +28,7 @@ from .steering import Steering
 
 #: Trouble that may pass while the hand holds: a push moves the object, and the fingers bring it back.
 PASSING = frozenset({"deviation", "lost_contact", "slip"})
-#: Fingers that land and lift within so long of each other do so in one step, in seconds: plans have 0.06 between the two.
+#: Where one finger takes over from another, the second lands within so long after the first has lifted, in seconds: plans take 0.06.
 HAND_OVER_TIME = 0.1
 #: The object turns by so much while it is taken hold of anew, in radians.
 REGRIP_TURN = 0.002
@@ -372,18 +372,15 @@ class Executor(Steering):
         if leg is None:
             return False
         all_holds, k = leg.ref.holds, self._k
-        now = all_holds[k]
-        while True:
-            # The first tick of this phase; the phase before ends where a finger lifted or landed.
+        while not bool((all_holds[k] & ~all_holds[self._k]).any()):
+            # The first tick of the phase in which the same fingers hold as at this one.
             first = k
             while first > 0 and bool((all_holds[first - 1] == all_holds[k]).all()):
                 first -= 1
-            # One finger may land some hundredths of a second after another one has lifted: that is one step.
+            # Between two fingers of which one takes over there is a short phase in which neither holds.
             if first == 0 or (k != self._k and (k + 1 - first) * self._plant.tick > HAND_OVER_TIME):
                 return False
             k = first - 1
-            if bool((all_holds[k] & ~now).any()):
-                break
         self._event("no_start", message, "back")
         while self._k > k:
             self._step_back()
@@ -481,8 +478,9 @@ class Executor(Steering):
                 may_pass = may_pass and (trigger.kind != "deviation" or monitor.is_sudden)
                 if not (may_pass and self._comes_back(monitor)):
                     # A leg that goes wrong again after it went on is not to be trusted; one that does so at once does not go on again.
-                    is_at_once = self._times_gone_on > 0 and (self._k - first) * self._plant.tick < settings.least_progress
-                    self._stopped, self._is_trusted = None if is_at_once else monitor, first == 0
+                    self._is_trusted = first == 0
+                    gets_nowhere = self._times_gone_on > 0 and (self._k - first) * self._plant.tick < settings.least_progress
+                    self._stopped = None if gets_nowhere else monitor
                     return trigger
                 resumed += 1
                 self._event(trigger.kind, trigger.message, "resume")
