@@ -348,7 +348,7 @@ def test_where_no_plan_is_found_the_hand_takes_hold_anew() -> None:
     barren.is_barren = True
     Told.tickets = []
     anew = regrasp.Session(scene, settings={**PLANNER, "end_margin": 0.05})
-    executor = Executor(barren, plant, ExecutorSettings(anytime=False, attempts=2), planning=Told, anew=[anew])
+    executor = Executor(barren, plant, ExecutorSettings(anytime=False, most_detours=1), planning=Told, anew=[anew])
     log = executor.run([goal])
     assert log.status == "done" and log.n_reached == 0
     asked = [angle_between(ticket.start.world_from_object.quat_xyzw, ticket.goal.quat_xyzw) for ticket in Told.tickets]
@@ -356,3 +356,41 @@ def test_where_no_plan_is_found_the_hand_takes_hold_anew() -> None:
     # The box is held better after it.
     (leg,) = log.plans
     assert leg is Told.tickets[1].answer and leg.statistics["relocations"] > 0
+
+
+class Guarded(Barren):
+    """A session that has no plan to ``goal``, unless it begins at ``way``."""
+
+    def __init__(self, session: regrasp.Session, goal: regrasp.Pose, way: regrasp.Pose) -> None:
+        super().__init__(session, "plan")
+        self._goal, self._way = goal, way
+
+    def plan(self, start: regrasp.Start, goal: regrasp.Pose, **more: Any) -> Any:
+        is_there = angle_between(start.world_from_object.quat_xyzw, self._way.quat_xyzw) < 0.1
+        self.is_barren = angle_between(goal.quat_xyzw, self._goal.quat_xyzw) < 0.1 and not is_there
+        return super().plan(start, goal, **more)
+
+
+@pytest.mark.parametrize(("way", "most_detours"), [("home", 2), ("first goal", 3), ("first goal", 2)])
+def test_where_no_plan_is_found_the_hand_goes_back_to_where_one_may_be(way: str, most_detours: int) -> None:
+    scene = regrasp.load_scene(SCENES / "box_90x.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    home = plant.pose
+    turned = [
+        regrasp.Pose(home.position, quat_product(quat_exp(np.array([angle, 0.0, 0.0])), np.array(home.quat_xyzw)[[3, 0, 1, 2]])[[1, 2, 3, 0]])
+        for angle in (0.3, 0.6, 0.9)
+    ]
+    ways = {"home": home, "first goal": turned[0]}
+    guarded: Any = Guarded(regrasp.Session(scene, settings=PLANNER), turned[2], ways[way])
+    Told.tickets = []
+    settings = ExecutorSettings(anytime=False, plan_attempts=1, choices=1, most_detours=most_detours)
+    log = Executor(guarded, plant, settings, planning=Told).run(turned)
+    # The first detour would be a new grasp, for which there is no session here; then it goes home, then to the first goal.
+    expected = [*turned, turned[2], home, turned[2], turned[0], turned[2]][: 4 + 2 * (most_detours - 1)]
+    asked = [angle_between(ticket.goal.quat_xyzw, pose.quat_xyzw) for ticket, pose in zip(Told.tickets, expected, strict=True)]
+    assert max(asked) < 0.03, asked
+    is_there = (way, most_detours) != ("first goal", 2)
+    assert log.status == "done" and [result.reached for result in log.goals] == [True, True, is_there]
+    last = [event.answer for event in log.events if event.kind == "no_plan"][-1]
+    assert last == ("replan" if is_there else "hold")
+    assert plant.touching() >= 2

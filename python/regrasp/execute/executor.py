@@ -87,6 +87,8 @@ class Executor(Steering):
         """True where it was stopped for the first time."""
         self._times_gone_on = 0
         self._n_queries = 0
+        self._home = Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+        """Where the object was seen when the run began."""
 
     @classmethod
     def of(cls, sessions: ExecutorSessions, plant: Plant, settings: ExecutorSettings | None = None, **more: Any) -> Executor:
@@ -106,6 +108,7 @@ class Executor(Steering):
         upcoming = Upcoming(goals)
         try:
             self._first_pose()
+            self._home = Pose(self._senses.position.copy(), self._senses.quat[[1, 2, 3, 0]].copy())
             prepared: Ticket | None = None
             before = self._senses.quat
             while not upcoming.has_ended:
@@ -150,9 +153,9 @@ class Executor(Steering):
         ahead: Ticket | None = None
         # A leg to another goal does not go on, unless nothing else is left.
         self._is_trusted = False
+        n_without, most_without = 0, settings.most_detours + 1 if settings.replanning else 1
         attempt, most = 0, settings.attempts if settings.replanning else 1
         while attempt < most:
-            answer = "replan" if attempt + 1 < most else "hold"
             made_ahead, prepared = prepared, None
             try:
                 ticket = self._leg_to(goal, made_ahead, is_again=attempt > 0, has_missed=has_missed)
@@ -160,16 +163,18 @@ class Executor(Steering):
                 self._times_gone_on += 1
                 self._event(cause.kind, str(cause), "resume")
             else:
-                attempt += 1
                 if not isinstance(ticket.answer, Plan):
-                    why_not = _no_plan(ticket)
-                    self._event("no_plan", why_not, answer)
-                    if self._anew and settings.replanning and attempt < most:
-                        motion_time += self._regrip(goal, self._anew)
+                    why_not, n_without = _no_plan(ticket), n_without + 1
+                    self._event("no_plan", why_not, "replan" if n_without < most_without else "hold")
+                    if n_without == most_without:
+                        break
+                    motion_time += self._detour(goal, n_without)
                     continue
+                attempt += 1
                 self._begin(ticket, ticket is made_ahead)
                 following = upcoming.peek() if settings.anytime and not (settings.replanning and attempt > 1) else None
                 ahead = None if following is None else self._ask_ahead(ticket.answer, following)
+            answer = "replan" if attempt < most else "hold"
             begun = self._senses.time
             trigger = self._run_leg()
             motion_time += self._senses.time - begun
@@ -215,6 +220,25 @@ class Executor(Steering):
         # Without a relocation the grasp holds well already.
         if not isinstance(ticket.answer, Plan) or ticket.answer.statistics["relocations"] == 0:
             return 0.0
+        return self._go_aside(ticket)
+
+    def _detour(self, goal: Pose, number: int) -> float:
+        """Where no plan leads to the goal, the hand makes a detour, from the end of which one may: first it takes hold of the object anew where
+        that is, then it goes where the run began, then to the first goal that it reached, and so on in turn. How long it moved."""
+        reached = next((result for result in self.log.goals if result.reached), None)
+        ways = [self._home] if reached is None else [self._home, Pose(np.array(reached.position), np.array(reached.quat_xyzw))]
+        turn = (number - 1) % (len(ways) + 1)
+        if turn == 0:
+            return self._regrip(goal, self._anew) if self._anew else 0.0
+        try:
+            ticket = self._query(ways[turn - 1])
+        except GoOn:
+            return 0.0
+        self._wait_for(ticket)
+        return self._go_aside(ticket) if isinstance(ticket.answer, Plan) else 0.0
+
+    def _go_aside(self, ticket: Ticket) -> float:
+        """Runs a leg that is none to the goal. How long the hand moved."""
         self._begin(ticket, False)
         begun = self._senses.time
         trigger = self._run_leg()

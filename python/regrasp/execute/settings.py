@@ -155,6 +155,9 @@ class ExecutorSettings:
     """Where there is none of these either, the hand goes back on its leg to before the last finger lifted, so often at most, and looks again."""
     attempts: int = 4
     """Legs that are tried for one goal."""
+    most_detours: int = 5
+    """Where no plan leads to a goal, the hand goes elsewhere first, so often at most: it takes hold of the object anew, goes where the run
+    began, or to the first goal that it reached."""
     again_speed: float = 1.0
     """All but the first run at this share of their plan's speed, where no finger relocates."""
     again_share: float = 1.0
