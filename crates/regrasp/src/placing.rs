@@ -112,8 +112,16 @@ pub fn of_draft(mut error: InputError, path: &Path, draft: &str) -> InputError {
         let line = diagnostic.place.line.and_then(|line| draft.lines().nth(line as usize - 1));
         let shown = line.map_or(String::new(), |line| format!(" (line `{line}`)"));
         diagnostic.problem = format!("{}, in the scene that would be written{shown}", diagnostic.problem);
-        if diagnostic.fix.contains("solid = \"hull\"") {
-            diagnostic.fix = format!("{}; for `regrasp place`, --solid hull", diagnostic.fix);
+        let scale = diagnostic
+            .fix
+            .split_once("scale = ")
+            .map(|(_, rest)| rest.split([' ', '[']).next().unwrap_or_default().to_owned());
+        let option = match scale.filter(|factor| !factor.is_empty()) {
+            Some(factor) => Some(format!("--scale {factor}")),
+            None => diagnostic.fix.contains("solid = \"hull\"").then(|| "--solid hull".to_owned()),
+        };
+        if let Some(option) = option {
+            diagnostic.fix = format!("{}; for `regrasp place`, {option}", diagnostic.fix);
         }
     }
     error
@@ -169,6 +177,26 @@ mod tests {
             }
         }
         assert_eq!(asked("sphere:0.03", &turns, &output, &hand).path(1), folder.path().join("scene.2.toml"));
+    }
+
+    /// A mesh in millimetres is told so, with the option.
+    #[test]
+    fn a_mesh_in_millimetres_is_told_the_option_that_scales_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let hand = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/hands/wide_four_finger/hand.toml");
+        let (output, mesh) = (folder.path().join("scene.toml"), folder.path().join("mm.obj"));
+        let text = "v 0 0 0\nv 50 0 0\nv 0 50 0\nv 0 0 50\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+        std::fs::write(&mesh, text).unwrap();
+        let turns = [Turn::read("z:90").unwrap()];
+        let large = asked(mesh.to_str().unwrap(), &turns, &output, &hand);
+        let load = |asked: &Asked| {
+            let draft = asked.scene().unwrap().text(None);
+            let loaded = load_scene_text(&output, draft.clone().into_bytes(), &LoadOptions::default());
+            loaded.map_err(|error| of_draft(error, &output, &draft).to_string())
+        };
+        let said = load(&large).err().unwrap();
+        assert!(said.contains("M201") && said.contains("; for `regrasp place`, --scale 0.001"), "{said}");
+        assert!(load(&Asked { scale: Some("0.001"), ..large }).is_ok());
     }
 
     /// A mesh with a hole has no volume; with its hull for its inside it has one. The line of the scene that nobody has yet is shown.

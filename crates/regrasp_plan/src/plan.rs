@@ -4,6 +4,8 @@
 //! `interpolate_pose` says, with the joints' progress along their chord as its parameter. Contact forces are linear in that
 //! parameter, in the object frame. Between two segments everything rests while forces change.
 
+use regrasp_geometry::Pose;
+use regrasp_grasp::list::GraspList;
 pub use regrasp_grasp::record::{PlanInput, PoseData};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -477,6 +479,52 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// A grasp list as one segment of waypoints, which promises no forces. It is no plan that anybody could carry out: what judges and
+    /// writes plans does the same with lists so.
+    pub fn of_grasps(list: &GraspList, waypoints: Vec<Waypoint>) -> Plan {
+        let promises = &list.promises;
+        let n_joints = list.hand.joint_names.len();
+        let identity = PoseData::from(&Pose::identity());
+        Plan {
+            format: list.format.clone(),
+            format_version: list.format_version,
+            tool: list.tool.clone(),
+            task: String::new(),
+            query: String::new(),
+            hand: list.hand.name.clone(),
+            object: list.object.name.clone(),
+            method: String::new(),
+            seed: list.seed,
+            settings: serde_json::Value::Null,
+            inputs: list.inputs.clone(),
+            promises: Promises {
+                contact_tolerance: promises.contact_tolerance,
+                friction: promises.friction,
+                friction_margin: promises.friction_margin,
+                required_margin: promises.required_margin,
+                kept_margin: promises.required_margin,
+                torque_scale: promises.torque_scale,
+                slip_tolerance: 0.0,
+                tracking: None,
+                motion: MotionLimits {
+                    largest_speed: 1.0,
+                    joint_velocities: vec![1.0; n_joints],
+                    joint_accelerations: vec![1.0; n_joints],
+                },
+                forces: None,
+            },
+            joint_names: list.hand.joint_names.clone(),
+            held_joints: list.hand.held_joints.clone(),
+            fingers: list.hand.fingers.clone(),
+            start: identity,
+            way_poses: Vec::new(),
+            goal: identity,
+            asked: None,
+            segments: vec![Segment::transfer(waypoints)],
+            statistics: Statistics::default(),
+        }
+    }
+
     /// How often a finger lands on a contact ([`relocations`]), counted from the segments.
     pub fn n_relocations(&self) -> u64 {
         relocations(&self.fingers, &self.segments)

@@ -11,7 +11,7 @@ use regrasp::plan::plan::{ContactState, Plan, Waypoint};
 use regrasp::planners::in_hand::starting::ProjectionLimits;
 use regrasp::robot::LoadOptions;
 use regrasp::scene::{LoadedScene, load_scene_text};
-use regrasp::session::Session;
+use regrasp::session::{Session, Touching};
 
 const HALF: [f64; 3] = [0.025, 0.025, 0.030];
 const EDGE_DISTANCE: f64 = 0.004;
@@ -163,4 +163,38 @@ fn a_fingertip_on_the_edge_itself_is_no_start() {
         }
     }
     assert!(n_refused >= 3, "only {n_refused}");
+}
+
+/// Where the other fingers hold the object, a fingertip on an edge is lifted off: the start has it free, and a plan leads on from there.
+#[test]
+fn a_fingertip_on_an_edge_is_lifted_off_where_the_others_hold() {
+    let strict = loaded(EDGE_DISTANCE);
+    let session = session(&strict);
+    let query = strict.task().query(0);
+    let (mut n_lifted, mut n_plans) = (0, 0);
+    for seed in 0..30 {
+        for waypoint in careless(seed, [0.0, 0.25 * EDGE_DISTANCE - 1e-4]) {
+            // Room to lift off, and seldom enough to move away from the edge.
+            let limits = ProjectionLimits { distance: 0.0007, turn: 0.02, ..ProjectionLimits::default() };
+            let Ok(start) = session.project(&observation(&waypoint), &limits) else { continue };
+            let on_edge: Vec<bool> = edge_distances(&waypoint)
+                .into_iter()
+                .map(|distance| distance.is_some_and(|distance| distance < 0.25 * EDGE_DISTANCE - 1e-4))
+                .collect();
+            let holds: Vec<bool> = start.touching.iter().map(|touching| *touching == Touching::Holds).collect();
+            // One that could be moved away far enough holds.
+            n_lifted += on_edge.iter().zip(&holds).filter(|(on_edge, holds)| **on_edge && !**holds).count();
+            let Ok(plan) = session.plan(&start, query.start(), seed, &Budget::work(1_000_000), &|_| {}) else {
+                continue;
+            };
+            assert_eq!(kinds(&session, &plan), [], "seed {seed}");
+            let first = edge_distances(&plan.segments[0].waypoints[0]);
+            for (finger, distance) in first.iter().enumerate() {
+                assert_eq!(distance.is_some(), holds[finger], "seed {seed}, finger {finger}");
+                assert!(distance.is_none_or(|distance| distance > 0.25 * EDGE_DISTANCE - 1e-6), "seed {seed}");
+            }
+            n_plans += usize::from(on_edge.iter().zip(&holds).any(|(on_edge, holds)| *on_edge && !*holds));
+        }
+    }
+    assert!(n_lifted >= 3 && n_plans >= 2, "lifted {n_lifted}, planned {n_plans}");
 }

@@ -8,9 +8,7 @@ use super::{Mjcf, MjcfError, model, must_be_of_hand};
 use regrasp_geometry::Pose;
 use regrasp_geometry::parts::Clear;
 use regrasp_plan::grasps::{GraspList, ListedContact, ListedGrasp};
-use regrasp_plan::plan::{
-    ContactMode, ContactState, MotionLimits, Plan, PoseData, Promises, Segment, Statistics, Waypoint,
-};
+use regrasp_plan::plan::{ContactMode, ContactState, Plan, PoseData, Waypoint};
 use regrasp_robot::Hand;
 use regrasp_scene::{GraspScene, Object};
 
@@ -29,7 +27,8 @@ pub fn to_mjcf(scene: &GraspScene, list: &GraspList) -> Result<Mjcf, MjcfError> 
         false => ObjectSolid::of(object),
     };
     let solids: Vec<ObjectSolid> = task.scene.objects.iter().enumerate().map(solid).collect();
-    Ok(model::write(&task, &plan_of(list), &solids))
+    let all_waypoints = list.grasps.iter().flat_map(|grasp| waypoints(list, grasp)).collect();
+    Ok(model::write(&task, &Plan::of_grasps(list, all_waypoints), &solids))
 }
 
 /// Where fingertips touch and links pass, in the object's frame.
@@ -77,51 +76,6 @@ fn object_from_links(hand: &Hand, object_from_hand: &Pose, joints: &[f64]) -> Ve
         first = end;
     }
     poses
-}
-
-/// The list as one segment of waypoints. It is no plan that anybody could carry out.
-fn plan_of(list: &GraspList) -> Plan {
-    let promises = &list.promises;
-    let n_joints = list.hand.joint_names.len();
-    let identity = PoseData::from(&Pose::identity());
-    Plan {
-        format: list.format.clone(),
-        format_version: list.format_version,
-        tool: list.tool.clone(),
-        task: String::new(),
-        query: String::new(),
-        hand: list.hand.name.clone(),
-        object: list.object.name.clone(),
-        method: String::new(),
-        seed: list.seed,
-        settings: serde_json::Value::Null,
-        inputs: list.inputs.clone(),
-        promises: Promises {
-            contact_tolerance: promises.contact_tolerance,
-            friction: promises.friction,
-            friction_margin: promises.friction_margin,
-            required_margin: promises.required_margin,
-            kept_margin: promises.required_margin,
-            torque_scale: promises.torque_scale,
-            slip_tolerance: 0.0,
-            tracking: None,
-            motion: MotionLimits {
-                largest_speed: 1.0,
-                joint_velocities: vec![1.0; n_joints],
-                joint_accelerations: vec![1.0; n_joints],
-            },
-            forces: None,
-        },
-        joint_names: list.hand.joint_names.clone(),
-        held_joints: list.hand.held_joints.clone(),
-        fingers: list.hand.fingers.clone(),
-        start: identity,
-        way_poses: Vec::new(),
-        goal: identity,
-        asked: None,
-        segments: vec![Segment::transfer(list.grasps.iter().flat_map(|grasp| waypoints(list, grasp)).collect())],
-        statistics: Statistics::default(),
-    }
 }
 
 /// The open hand, then the grasp.

@@ -74,7 +74,8 @@ pub enum Touching {
     Holds,
     /// It touches and slides; it holds in the start, as soon as it rests.
     Slides,
-    /// It does not touch.
+    /// It does not touch, or touches where no contact of a start may be (nearer to an edge than a quarter of the object's `edge_distance`):
+    /// the start lifts it off.
     Free,
 }
 
@@ -124,12 +125,17 @@ pub fn project(model: &Model, observed: &Observed, limits: &ProjectionLimits) ->
     };
     let mut holding = (0..model.n_fingers()).filter(|&f| touches(f)).fold(0_u32, |bits, f| bits | 1 << f);
     let mut last = None;
-    // Whoever touches least is taken to be free, one finger after the other, as long as the others hold.
+    // A fingertip that may not touch where it does is lifted off. Then whoever touches least is taken to be free, one finger after the
+    // other, as long as the others hold.
     while holding != 0 {
         match start_with(model, observed, &posture, holding, limits) {
             Ok(state) => return Ok(described(model, observed, &posture, state, limits)),
             Err(failure) => last.get_or_insert(failure),
         };
+        if let Some(finger) = on_an_edge(model, &posture, holding) {
+            holding &= !(1 << finger);
+            continue;
+        }
         let loose = (0..model.n_fingers()).filter(|&f| holding & (1 << f) != 0 && felt(f) != Some(true));
         let farthest = loose.max_by(|&a, &b| gaps[a].unwrap_or(f64::MIN).total_cmp(&gaps[b].unwrap_or(f64::MIN)));
         match farthest.filter(|&f| gaps[f].is_some_and(|gap| gap > 0.0)) {
@@ -144,6 +150,16 @@ pub fn project(model: &Model, observed: &Observed, limits: &ProjectionLimits) ->
             "look where the object is, and grasp it anew",
         )
     }))
+}
+
+/// A finger of `holding` whose tip, where all of them touch, is nearer to an edge than a contact of a start may be.
+fn on_an_edge(model: &Model, posture: &Posture, holding: u32) -> Option<usize> {
+    let fitted = fit(model, posture, holding);
+    let (object, body) = (Placement::from(&fitted.object), model.view.object);
+    (0..model.n_fingers()).filter(|&f| holding & (1 << f) != 0).find(|&f| {
+        let contact = model.fingers[f].contact_at(&body.surface, &fitted.joints[f], &object);
+        contact.is_some_and(|(contact, _)| !body.may_start_at(&body.surface.project(&contact.point_in_object)))
+    })
 }
 
 fn refusal(message: String, advice: &str) -> Failure {

@@ -1,60 +1,22 @@
 //! A grasp list as a plan of waypoints: what judges plans judges it.
 
-use crate::plan::{
-    ContactMode, ContactState, ForcePromises, MotionLimits, Plan, PoseData, Promises, Segment, Statistics, Waypoint,
-};
+use crate::plan::{ContactMode, ContactState, ForcePromises, Plan, PoseData, Waypoint};
 use regrasp_geometry::Pose;
 use regrasp_grasp::list::{GraspList, ListedGrasp};
 
-/// The list as a plan: one segment with one waypoint for each grasp. It is no plan that anybody could carry out.
+/// The list as a plan with one waypoint for each grasp.
 pub(super) fn plan_of(list: &GraspList) -> Plan {
-    let promises = &list.promises;
-    let n_joints = list.hand.joint_names.len();
     let waypoints = list.grasps.iter().map(|grasp| grasp_waypoint(list, grasp)).collect();
-    let identity = PoseData::from(&Pose::identity());
-    Plan {
-        format: list.format.clone(),
-        format_version: list.format_version,
-        tool: list.tool.clone(),
-        task: String::new(),
-        query: String::new(),
-        hand: list.hand.name.clone(),
-        object: list.object.name.clone(),
-        method: String::new(),
-        seed: list.seed,
-        settings: serde_json::Value::Null,
-        inputs: list.inputs.clone(),
-        promises: Promises {
-            contact_tolerance: promises.contact_tolerance,
-            friction: promises.friction,
-            friction_margin: promises.friction_margin,
-            required_margin: promises.required_margin.max(0.0),
-            kept_margin: promises.required_margin.max(0.0),
-            torque_scale: promises.torque_scale,
-            slip_tolerance: 0.0,
-            tracking: None,
-            motion: MotionLimits {
-                largest_speed: 1.0,
-                joint_velocities: vec![1.0; n_joints],
-                joint_accelerations: vec![1.0; n_joints],
-            },
-            forces: Some(ForcePromises {
-                mass: list.object.mass,
-                gravity_in_world: None,
-                normal_force: promises.normal_force,
-                joint_torques: promises.joint_torques.clone(),
-            }),
-        },
-        joint_names: list.hand.joint_names.clone(),
-        held_joints: list.hand.held_joints.clone(),
-        fingers: list.hand.fingers.clone(),
-        start: identity,
-        asked: None,
-        way_poses: Vec::new(),
-        goal: identity,
-        segments: vec![Segment::transfer(waypoints)],
-        statistics: Statistics::default(),
-    }
+    let mut plan = Plan::of_grasps(list, waypoints);
+    plan.promises.required_margin = plan.promises.required_margin.max(0.0);
+    plan.promises.kept_margin = plan.promises.required_margin;
+    plan.promises.forces = Some(ForcePromises {
+        mass: list.object.mass,
+        gravity_in_world: None,
+        normal_force: list.promises.normal_force,
+        joint_torques: list.promises.joint_torques.clone(),
+    });
+    plan
 }
 
 /// The object in the hand frame: the hand stands still.
