@@ -159,6 +159,7 @@ fn a_fingertip_on_the_edge_itself_is_no_start() {
             let limits = ProjectionLimits { distance: 1e-5, turn: 1e-3, ..ProjectionLimits::default() };
             let failure = session.project(&observation(&waypoint), &limits).unwrap_err();
             assert!(failure.message.contains("nearer to an edge than 0.001 m"), "{}", failure.message);
+            assert!(failure.message.contains("with that finger lifted off, "), "{}", failure.message);
             n_refused += 1;
         }
     }

@@ -124,16 +124,23 @@ pub fn project(model: &Model, observed: &Observed, limits: &ProjectionLimits) ->
         gaps[finger].is_none_or(|gap| gap <= reach)
     };
     let mut holding = (0..model.n_fingers()).filter(|&f| touches(f)).fold(0_u32, |bits, f| bits | 1 << f);
-    let mut last = None;
+    let (mut first, mut was_lifted): (Option<Failure>, bool) = (None, false);
     // A fingertip that may not touch where it does is lifted off. Then whoever touches least is taken to be free, one finger after the
     // other, as long as the others hold.
     while holding != 0 {
         match start_with(model, observed, &posture, holding, limits) {
             Ok(state) => return Ok(described(model, observed, &posture, state, limits)),
-            Err(failure) => last.get_or_insert(failure),
-        };
+            Err(failure) => match &mut first {
+                None => first = Some(failure),
+                Some(first) if was_lifted => {
+                    first.message = format!("{}; with that finger lifted off, {}", first.message, failure.message);
+                }
+                Some(_) => {}
+            },
+        }
+        was_lifted = false;
         if let Some(finger) = on_an_edge(model, &posture, holding) {
-            holding &= !(1 << finger);
+            (was_lifted, holding) = (true, holding & !(1 << finger));
             continue;
         }
         let loose = (0..model.n_fingers()).filter(|&f| holding & (1 << f) != 0 && felt(f) != Some(true));
@@ -143,7 +150,7 @@ pub fn project(model: &Model, observed: &Observed, limits: &ProjectionLimits) ->
             None => break,
         }
     }
-    Err(last.unwrap_or_else(|| {
+    Err(first.unwrap_or_else(|| {
         let nearest = gaps.iter().flatten().copied().fold(f64::INFINITY, f64::min);
         refusal(
             format!("no finger touches the object: the nearest is {:.1} mm away", 1e3 * nearest),
