@@ -394,3 +394,21 @@ def test_where_no_plan_is_found_the_hand_goes_back_to_where_one_may_be(way: str,
     last = [event.answer for event in log.events if event.kind == "no_plan"][-1]
     assert last == ("replan" if is_there else "hold")
     assert plant.touching() >= 2
+
+
+def test_where_a_leg_went_wrong_no_detour_is_made() -> None:
+    scene = regrasp.load_scene(SCENES / "box_90x.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    goal = next(turns(plant.pose, count=1, seed=3, largest=0.5))
+    barren: Any = Barren(regrasp.Session(scene, settings=PLANNER), "plan")
+
+    def listen(entry: Any) -> None:
+        barren.is_barren |= getattr(entry, "kind", "") == "missed"
+
+    Told.tickets = []
+    # No leg ever comes so near.
+    settings = ExecutorSettings(anytime=False, attempts=3, plan_attempts=1, choices=1, reached_turn=1e-9)
+    log = Executor(barren, plant, settings, planning=Told, listener=listen).run([goal])
+    assert [event.kind for event in log.events] == ["missed", "no_plan", "no_plan"]
+    assert [angle_between(ticket.goal.quat_xyzw, goal.quat_xyzw) < 0.01 for ticket in Told.tickets] == [True] * 3
+    assert log.status == "done" and log.n_reached == 0

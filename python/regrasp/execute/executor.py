@@ -164,11 +164,17 @@ class Executor(Steering):
                 self._event(cause.kind, str(cause), "resume")
             else:
                 if not isinstance(ticket.answer, Plan):
-                    why_not, n_without = _no_plan(ticket), n_without + 1
-                    self._event("no_plan", why_not, "replan" if n_without < most_without else "hold")
-                    if n_without == most_without:
+                    why_not, detour = _no_plan(ticket), 1
+                    # Where a leg went wrong, a detour is as likely to end in more trouble: the query counts as a leg.
+                    if attempt > 0:
+                        attempt += 1
+                    else:
+                        n_without = detour = n_without + 1
+                    is_last = attempt == most or n_without == most_without
+                    self._event("no_plan", why_not, "hold" if is_last else "replan")
+                    if is_last:
                         break
-                    motion_time += self._detour(goal, n_without)
+                    motion_time += self._detour(goal, detour)
                     continue
                 attempt += 1
                 self._begin(ticket, ticket is made_ahead)

@@ -154,10 +154,10 @@ class ExecutorSettings:
     most_retreats: int = 2
     """Where there is none of these either, the hand goes back on its leg to before the last finger lifted, so often at most, and looks again."""
     attempts: int = 4
-    """Legs that are tried for one goal."""
+    """Legs that are tried for one goal. After the first, queries without a plan count too."""
     most_detours: int = 5
-    """Where no plan leads to a goal, the hand goes elsewhere first, so often at most: it takes hold of the object anew, goes where the run
-    began, or to the first goal that it reached."""
+    """Where no plan leads to a goal, and no leg to it has gone wrong, the hand goes elsewhere first, so often at most: it takes hold of the
+    object anew, goes where the run began, or to the first goal that it reached."""
     again_speed: float = 1.0
     """All but the first run at this share of their plan's speed, where no finger relocates."""
     again_share: float = 1.0
