@@ -165,7 +165,7 @@ class Executor(Steering):
             else:
                 if not isinstance(ticket.answer, Plan):
                     why_not, detour = _no_plan(ticket), 1
-                    # Where a leg went wrong, a detour is as likely to end in more trouble: the query counts as a leg.
+                    # Where a leg went wrong, detours would be still more motion of fingertips that slip: the query counts as a leg.
                     if attempt > 0:
                         attempt += 1
                     else:
