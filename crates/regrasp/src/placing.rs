@@ -115,7 +115,7 @@ pub fn of_draft(mut error: InputError, path: &Path, draft: &str) -> InputError {
         let scale = diagnostic
             .fix
             .split_once("scale = ")
-            .map(|(_, rest)| rest.split([' ', '[']).next().unwrap_or_default().to_owned());
+            .map(|(_, rest)| rest.split([' ', ',', '[']).next().unwrap_or_default().to_owned());
         let option = match scale.filter(|factor| !factor.is_empty()) {
             Some(factor) => Some(format!("--scale {factor}")),
             None => diagnostic.fix.contains("solid = \"hull\"").then(|| "--solid hull".to_owned()),
@@ -135,11 +135,18 @@ fn refused(argument: &str, problem: String, expected: &str) -> InputError {
 mod tests {
     use super::*;
     use regrasp_robot::import::LoadOptions;
-    use regrasp_scene::load_scene_text;
+    use regrasp_scene::{LoadedScene, load_scene_text};
 
     fn asked<'a>(object: &'a str, turns: &'a [Turn], output: &'a Path, hand: &'a Path) -> Asked<'a> {
         let (mass, friction, scale, solid, torsion_radius) = (None, None, None, None, None);
         Asked { output, hand, object, turns, mass, friction, scale, solid, torsion_radius, packages: &[] }
+    }
+
+    /// The scene that would be written, or what is wrong with it.
+    fn load(asked: &Asked) -> Result<LoadedScene, String> {
+        let draft = asked.scene().unwrap().text(None);
+        let loaded = load_scene_text(asked.output, draft.clone().into_bytes(), &LoadOptions::default());
+        loaded.map_err(|error| of_draft(error, asked.output, &draft).to_string())
     }
 
     /// What is written is read back as what was asked, with the start given and left open.
@@ -189,13 +196,13 @@ mod tests {
         std::fs::write(&mesh, text).unwrap();
         let turns = [Turn::read("z:90").unwrap()];
         let large = asked(mesh.to_str().unwrap(), &turns, &output, &hand);
-        let load = |asked: &Asked| {
-            let draft = asked.scene().unwrap().text(None);
-            let loaded = load_scene_text(&output, draft.clone().into_bytes(), &LoadOptions::default());
-            loaded.map_err(|error| of_draft(error, &output, &draft).to_string())
-        };
-        let said = load(&large).err().unwrap();
-        assert!(said.contains("M201") && said.contains("; for `regrasp place`, --scale 0.001"), "{said}");
+        for solid in [None, Some("hull")] {
+            let said = load(&Asked { solid, ..large }).err().unwrap();
+            assert!(
+                said.contains("M201") && said.trim_end().ends_with("; for `regrasp place`, --scale 0.001"),
+                "{said}"
+            );
+        }
         assert!(load(&Asked { scale: Some("0.001"), ..large }).is_ok());
     }
 
@@ -211,11 +218,6 @@ mod tests {
         let turns = [Turn::read("z:90").unwrap()];
         let object = mesh.to_str().unwrap();
         let open = asked(object, &turns, &output, &hand);
-        let load = |asked: &Asked| {
-            let draft = asked.scene().unwrap().text(None);
-            let loaded = load_scene_text(&output, draft.clone().into_bytes(), &LoadOptions::default());
-            loaded.map_err(|error| of_draft(error, &output, &draft).to_string())
-        };
         let said = load(&open).err().unwrap();
         assert!(said.contains("M210") && said.contains("(line `[object]`)"), "{said}");
         assert!(said.contains("for `regrasp place`, --solid hull"), "{said}");

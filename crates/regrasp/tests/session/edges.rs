@@ -159,7 +159,9 @@ fn a_fingertip_on_the_edge_itself_is_no_start() {
             let limits = ProjectionLimits { distance: 1e-5, turn: 1e-3, ..ProjectionLimits::default() };
             let failure = session.project(&observation(&waypoint), &limits).unwrap_err();
             assert!(failure.message.contains("nearer to an edge than 0.001 m"), "{}", failure.message);
-            assert!(failure.message.contains("with that finger lifted off, "), "{}", failure.message);
+            let (edge, after) = failure.message.split_once("; with finger \"").unwrap();
+            let named = after.split_once("\" lifted off, ").unwrap().0;
+            assert!(edge.contains(&format!("finger \"{named}\" touches nearer to an edge")), "{}", failure.message);
             n_refused += 1;
         }
     }

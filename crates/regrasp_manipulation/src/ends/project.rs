@@ -124,23 +124,25 @@ pub fn project(model: &Model, observed: &Observed, limits: &ProjectionLimits) ->
         gaps[finger].is_none_or(|gap| gap <= reach)
     };
     let mut holding = (0..model.n_fingers()).filter(|&f| touches(f)).fold(0_u32, |bits, f| bits | 1 << f);
-    let (mut first, mut was_lifted): (Option<Failure>, bool) = (None, false);
+    let (mut first, mut lifted): (Option<Failure>, Option<usize>) = (None, None);
     // A fingertip that may not touch where it does is lifted off. Then whoever touches least is taken to be free, one finger after the
     // other, as long as the others hold.
     while holding != 0 {
         match start_with(model, observed, &posture, holding, limits) {
             Ok(state) => return Ok(described(model, observed, &posture, state, limits)),
-            Err(failure) => match &mut first {
-                None => first = Some(failure),
-                Some(first) if was_lifted => {
-                    first.message = format!("{}; with that finger lifted off, {}", first.message, failure.message);
+            Err(failure) => match (&mut first, lifted) {
+                (None, _) => first = Some(failure),
+                (Some(first), Some(finger)) => {
+                    let name = &model.view.hand.fingers[finger].name;
+                    first.message =
+                        format!("{}; with finger \"{name}\" lifted off, {}", first.message, failure.message);
                 }
-                Some(_) => {}
+                (Some(_), None) => {}
             },
         }
-        was_lifted = false;
-        if let Some(finger) = on_an_edge(model, &posture, holding) {
-            (was_lifted, holding) = (true, holding & !(1 << finger));
+        lifted = on_an_edge(model, &posture, holding);
+        if let Some(finger) = lifted {
+            holding &= !(1 << finger);
             continue;
         }
         let loose = (0..model.n_fingers()).filter(|&f| holding & (1 << f) != 0 && felt(f) != Some(true));
