@@ -316,12 +316,12 @@ def test_without_a_start_the_hand_goes_back_to_where_the_finger_had_lifted(
         ([(0, "1011"), (50, "1111"), (65, "0111")], 64),
         # Here it took longer, so the step before is another one.
         ([(0, "1011"), (50, "0011"), (80, "0111")], None),
-        # No finger has lifted: one has landed, or nothing happened.
-        ([(0, "0111"), (50, "1111")], None),
-        ([(0, "0111")], None),
+        # No finger has lifted: one has landed, or nothing happened. The leg began with a start.
+        ([(0, "0111"), (50, "1111")], 0),
+        ([(0, "0111")], 0),
     ],
 )
-def test_going_back_ends_before_the_finger_lifted(phases: list[tuple[int, str]], back_to: int | None) -> None:
+def test_going_back_ends_before_the_finger_lifted_or_where_the_leg_began(phases: list[tuple[int, str]], back_to: int | None) -> None:
     scene = regrasp.load_scene(SCENES / "box_90x.toml")
     plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
     executor = Executor(regrasp.Session(scene, settings=PLANNER), plant)
@@ -337,6 +337,9 @@ def test_going_back_ends_before_the_finger_lifted(phases: list[tuple[int, str]],
     assert executor._k == (last if back_to is None else back_to)
     # What went wrong is not gone on with.
     assert (executor._stopped is None) == (back_to is not None)
+    # There is nothing before the beginning.
+    if back_to == 0:
+        assert not executor._retreat("said by the test") and executor._k == 0
     assert plant.touching() >= 2
 
 

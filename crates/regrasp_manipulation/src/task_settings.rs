@@ -1,7 +1,7 @@
 //! Settings of pick and place.
 
 use crate::motion_settings::{MotionMethod, PartsMove};
-use crate::settings::ForceSettings;
+use crate::settings::{ForceSettings, LEAST_CONE_WEIGHT};
 use serde::{Deserialize, Serialize};
 
 /// What a good plan of pick and place is.
@@ -136,7 +136,12 @@ impl Default for TaskSettings {
             placements: 24,
             placement_rounds: 4,
             max_edges: 2000,
-            forces: ForceSettings { normal_force: [2.0, 40.0], squeeze_weight: 1.0, ..ForceSettings::default() },
+            forces: ForceSettings {
+                normal_force: [2.0, 40.0],
+                squeeze_weight: 1.0,
+                cone_weight: LEAST_CONE_WEIGHT,
+                ..ForceSettings::default()
+            },
         }
     }
 }

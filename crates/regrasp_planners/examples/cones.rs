@@ -118,7 +118,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         torque_scale: RADII[2],
         friction: object.friction,
         sliding_friction: object.friction,
-        limits: ForceLimits { least, largest, squeeze: forces.squeeze, squeeze_weight: forces.squeeze_weight },
+        limits: ForceLimits {
+            least,
+            largest,
+            squeeze: forces.squeeze,
+            squeeze_weight: forces.squeeze_weight,
+            cone_weight: forces.cone_weight,
+        },
         cones: Cones::Pyramid,
     };
     let gravity = Vector::new(0.0, 0.0, -9.80665) * object.mass;

@@ -397,7 +397,7 @@ class Executor(Steering):
 
     def _retreat(self, message: str) -> bool:
         """Goes back on the leg to before the last finger had lifted, wherever the object is by now: that finger takes hold again where it
-        did, and one that had landed since lifts. False where no finger has lifted on this leg."""
+        did, and one that had landed since lifts. Where no finger has lifted since the leg began, back to there. False where that is here."""
         leg = self._leg
         if leg is None:
             return False
@@ -408,8 +408,13 @@ class Executor(Steering):
             while first > 0 and bool((all_holds[first - 1] == all_holds[k]).all()):
                 first -= 1
             # Between two fingers of which one takes over there is a short phase in which neither holds.
-            if first == 0 or (k != self._k and (k + 1 - first) * self._plant.tick > HAND_OVER_TIME):
+            if k != self._k and (k + 1 - first) * self._plant.tick > HAND_OVER_TIME:
                 return False
+            if first == 0:
+                if self._k == 0:
+                    return False
+                k = 0
+                break
             k = first - 1
         self._event("no_start", message, "back")
         while self._k > k:

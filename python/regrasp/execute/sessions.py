@@ -8,7 +8,7 @@ from typing import Any
 
 from .._model import Scene
 from .._session import Session
-from .settings import ANEW, FIRM, LOOSE, PLANNER, careful_settings, work_share
+from .settings import ANEW, FIRM, careful_settings, loose_settings, usual_settings, work_share
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class ExecutorSessions:
         def opened(kind: Mapping[str, Any]) -> Session:
             return Session(scene, settings=planner_settings(kind, work_share(hand)))
 
-        return cls(opened(PLANNER), tuple(opened(kind) for kind in careful_settings(moved)), opened(LOOSE), opened(FIRM), opened(ANEW))
+        return cls(opened(usual_settings(moved)), tuple(opened(kind) for kind in careful_settings(moved)), opened(loose_settings(moved)), opened(FIRM), opened(ANEW))
 
 
 def planner_settings(settings: Mapping[str, Any], share: float) -> dict[str, Any]:

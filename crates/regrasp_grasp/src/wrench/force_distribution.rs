@@ -3,8 +3,9 @@
 //!
 //! Of all such forces those with the least
 //! `sum |f_t|^2 + (m / e)^2 + weight (f_n - squeeze)^2` (tangential force, torsion over torsion radius, normal force),
-//! but for a small fixed barrier before every limit that keeps them strictly inside and makes them an analytic function
-//! of contacts, load and limits: along a plan they are smooth wherever these are. The objective is that of the notes on
+//! but for a barrier before every limit that keeps them strictly inside and makes them an analytic function of contacts,
+//! load and limits: along a plan they are smooth wherever these are. Before the cones it is as large as the caller says: of
+//! forces that all balance, those are better that stay far from where a contact slips. Before all others it is small. The objective is that of the notes on
 //! physics (replays in MuJoCo); Buss, Hashimoto, Moore, *Dextrous hand grasping force optimization*, IEEE T-RA 12 (1996),
 //! minimise over the same cones with the same kind of barrier.
 //!
@@ -101,6 +102,9 @@ pub struct ForceLimits {
     pub squeeze: f64,
     /// What a square of a newton beside that counts, against one of tangential force.
     pub squeeze_weight: f64,
+    /// Weight of a logarithmic barrier before the friction cones, in squares of the squeeze: the larger, the farther forces stay from where
+    /// contacts slip. At least that of all other limits, 0.001; less counts as that.
+    pub cone_weight: f64,
 }
 
 /// A grasp under load.
@@ -300,7 +304,7 @@ fn program<const D: usize>(problem: &ForceProblem, relaxed: Relaxed) -> Option<P
     let load = &problem.load;
     let torque = load.torque / frame.torque_scale;
     let balance = [load.force.x, load.force.y, load.force.z, torque.x, torque.y, torque.z].map(|x| -x);
-    Program::new(blocks, balance, limits.squeeze, limits.squeeze_weight)
+    Program::new(blocks, balance, limits.squeeze, limits.squeeze_weight, limits.cone_weight)
 }
 
 /// What a unit of each coordinate exerts; nothing for those that the contact does not transmit.

@@ -13,7 +13,8 @@ use regrasp_grasp::{
     Contact, ContactForce, ContactModel, ForceLimits, ForceProblem, GraspFrame, Grip, NoForces, Wrench,
 };
 
-const LIMITS: ForceLimits = ForceLimits { least: 2.0, largest: 15.0, squeeze: 4.0, squeeze_weight: 0.2 };
+const LIMITS: ForceLimits =
+    ForceLimits { least: 2.0, largest: 15.0, squeeze: 4.0, squeeze_weight: 0.2, cone_weight: 1e-3 };
 /// The barrier's weight, and the number of its logarithms per contact (cone, twice; two bounds) and joint (two bounds).
 const BARRIER: f64 = 1e-3 * 16.0;
 
@@ -496,7 +497,7 @@ fn any_scale_of_forces_will_do() {
         (1e-3, 1e-2, 4e-3, 1e-3),
         (100.0, 1000.0, 300.0, 200.0),
     ] {
-        let limits = ForceLimits { least, largest, squeeze, squeeze_weight: 0.2 };
+        let limits = ForceLimits { least, largest, squeeze, squeeze_weight: 0.2, cone_weight: 1e-3 };
         let mut n_found = 0;
         for _ in 0..200 {
             let models = models(4, &mut rng);
@@ -513,4 +514,77 @@ fn any_scale_of_forces_will_do() {
         }
         assert!(n_found > 10, "{limits:?}: {n_found}");
     }
+}
+
+/// What forces make least: effort, and barriers before all limits (no joints).
+fn with_barriers(problem: &ForceProblem, forces: &[ContactForce]) -> f64 {
+    let (limits, mu) = (problem.limits, problem.frame.friction);
+    let each = problem.grips.iter().zip(forces).map(|(grip, force)| {
+        let c = grip.components(force, mu);
+        let across = c.tangential.norm_squared() + c.torsion * c.torsion;
+        let cone = if grip.model == ContactModel::Frictionless { 1.0 } else { (mu * c.normal).powi(2) - across };
+        let bounds = (c.normal - limits.least) * (limits.largest - c.normal);
+        let off = c.normal - limits.squeeze;
+        let barriers = limits.cone_weight.max(1e-3) * cone.ln() + 1e-3 * bounds.ln();
+        across + limits.squeeze_weight * off * off - limits.squeeze.powi(2) * barriers
+    });
+    each.sum()
+}
+
+/// Largest share of the friction that any contact needs.
+fn friction_needed(problem: &ForceProblem, forces: &[ContactForce]) -> f64 {
+    let shares = problem.grips.iter().zip(forces).map(|(grip, force)| {
+        let c = grip.components(force, problem.frame.friction);
+        let across = c.tangential.norm_squared() + c.torsion * c.torsion;
+        across.sqrt() / (problem.frame.friction * c.normal)
+    });
+    shares.fold(0.0, f64::max)
+}
+
+/// No forces that balance are better: towards none of those that other wishes lead to does the sum with all barriers fall.
+/// And contacts need less friction, the more the cones weigh.
+#[test]
+fn forces_stay_away_from_the_cones_as_far_as_asked() {
+    let mut rng = Rng::keyed(11, "forces", 0);
+    let weights = [0.0, 0.01, 0.1, 1.0];
+    let (mut n_solved, mut needed) = (0, [0.0; 4]);
+    while n_solved < 300 {
+        let models = if n_solved % 2 == 0 { vec![ContactModel::Point; 4] } else { models(4, &mut rng) };
+        let grips = grips(&models, &mut rng);
+        let load = weight(&mut rng);
+        let of = |limits: ForceLimits| ForceProblem { limits, ..problem(&grips, &[], load) };
+        if !can_balance(&of(LIMITS)) {
+            continue;
+        }
+        n_solved += 1;
+        let others: Vec<BalancedForces> =
+            [(2.5, 0.05), (2.5, 5.0), (4.0, 1.0), (6.0, 0.3), (8.0, 0.1), (10.0, 3.0), (12.0, 0.02)]
+                .into_iter()
+                .map(|(squeeze, squeeze_weight)| ForceLimits { squeeze, squeeze_weight, cone_weight: 0.03, ..LIMITS })
+                .map(|limits| distribute(&of(limits), None).expect("limits are the same"))
+                .collect();
+        for (cone_weight, needed) in weights.into_iter().zip(&mut needed) {
+            let problem = of(ForceLimits { cone_weight, ..LIMITS });
+            let forces = distribute(&problem, None).expect("limits are the same");
+            assert_good(&problem, &forces);
+            let least = with_barriers(&problem, &forces);
+            for other in &others {
+                for step in [1e-4, 1e-2, 0.3] {
+                    let towards: BalancedForces = forces
+                        .iter()
+                        .zip(other)
+                        .map(|(f, o)| ContactForce {
+                            force: f.force.lerp(&o.force, step),
+                            torsion: f.torsion + step * (o.torsion - f.torsion),
+                        })
+                        .collect();
+                    let there = with_barriers(&problem, &towards);
+                    assert!(there > least - 1e-9 * (1.0 + least.abs()), "{cone_weight}: {least} {there} at {step}");
+                }
+            }
+            *needed += friction_needed(&problem, &forces) / 300.0;
+        }
+    }
+    assert!(needed.is_sorted_by(|more, less| more > less), "{needed:?}");
+    assert!(needed[2] < 0.93 * needed[0], "{needed:?}");
 }

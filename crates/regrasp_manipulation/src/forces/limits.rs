@@ -40,14 +40,15 @@ pub enum Unbalanced {
 impl ForceModel {
     /// Of a scene; None for plans without forces.
     pub fn new(view: &HandView, settings: &PhysicsSettings) -> Option<Self> {
-        let ForceSettings { squeeze, squeeze_weight, normal_force: [least, largest], torque_share } = settings.forces?;
+        let ForceSettings { squeeze, squeeze_weight, cone_weight, normal_force: [least, largest], torque_share } =
+            settings.forces?;
         let effort = |name: &String| {
             let joint = view.hand.robot.joint_named(name)?;
             view.hand.robot.joints[joint.0].limits?.effort
         };
         let torque = |name: &String| effort(name).map_or(f64::INFINITY, |effort| effort * torque_share);
         Some(ForceModel {
-            limits: ForceLimits { least, largest, squeeze, squeeze_weight },
+            limits: ForceLimits { least, largest, squeeze, squeeze_weight, cone_weight },
             mass: view.object.mass,
             gravity: view.gravity,
             torques: view.hand.fingers.iter().map(|f| f.chain.names.iter().map(torque).collect()).collect(),

@@ -110,7 +110,7 @@ pub fn promises(model: &Model, kept_margin: f64) -> Promises {
 pub fn dynamics(model: &Model) -> Vec<f64> {
     let mut numbers: Vec<f64> = promises(model, 0.0).numbers().collect();
     if let Some(forces) = &model.settings.forces {
-        numbers.extend([forces.squeeze, forces.squeeze_weight, forces.torque_share]);
+        numbers.extend([forces.squeeze, forces.squeeze_weight, forces.cone_weight, forces.torque_share]);
         numbers.extend(forces.normal_force);
     }
     if let Some(forces) = &model.forces {

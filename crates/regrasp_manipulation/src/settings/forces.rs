@@ -18,6 +18,10 @@ pub struct ForceSettings {
     /// Weight of the squared deviation from `squeeze`, against one squared newton of tangential force. Origin:
     /// simulation of a prototype.
     pub squeeze_weight: f64,
+    /// Weight of staying away from friction cones, in squares of the squeeze: of a logarithmic barrier before every cone. The larger, the more
+    /// friction may be missing before a contact slips; 0.001 is as good as none. Origin: replays and chains of goals with less friction than the
+    /// plan counts on (docs/benchmarks/forces.md).
+    pub cone_weight: f64,
     /// Least and largest normal force of a holding finger, in newtons. Origin: simulation of a prototype; below 2 N
     /// contacts were lost.
     pub normal_force: [f64; 2],
@@ -28,14 +32,21 @@ pub struct ForceSettings {
 
 impl Default for ForceSettings {
     fn default() -> Self {
-        ForceSettings { squeeze: 4.0, squeeze_weight: 0.2, normal_force: [2.0, 15.0], torque_share: 1.0 }
+        ForceSettings {
+            squeeze: 4.0,
+            squeeze_weight: 0.2,
+            cone_weight: 0.3,
+            normal_force: [2.0, 15.0],
+            torque_share: 1.0,
+        }
     }
 }
 
 impl ForceSettings {
     /// What is wrong with the settings, if anything.
     pub fn validate(&self) -> Result<(), String> {
-        let ForceSettings { squeeze, squeeze_weight, normal_force: [least, largest], torque_share } = *self;
+        let ForceSettings { squeeze, squeeze_weight, cone_weight, normal_force: [least, largest], torque_share } =
+            *self;
         if !(least >= 0.0 && least < largest && largest <= MAX_FORCE) {
             return Err(format!(
                 "forces.normal_force is [{least}, {largest}]; it must be the least and a larger largest force, between 0 and \
@@ -50,6 +61,9 @@ impl ForceSettings {
         if !(squeeze_weight > 0.0 && squeeze_weight <= 1e3) {
             return Err(format!("forces.squeeze_weight is {squeeze_weight}; it must be above 0 and at most 1000"));
         }
+        if !(LEAST_CONE_WEIGHT..=1e3).contains(&cone_weight) {
+            return Err(format!("forces.cone_weight is {cone_weight}; it must be between 0.001 and 1000"));
+        }
         if !(torque_share > 0.0 && torque_share <= 1.0) {
             return Err(format!("forces.torque_share is {torque_share}; it must be above 0 and at most 1"));
         }
@@ -57,5 +71,7 @@ impl ForceSettings {
     }
 }
 
+/// Weight of the cones with which forces may come as near to them as to any other limit.
+pub const LEAST_CONE_WEIGHT: f64 = 1e-3;
 /// Largest force of a finger that makes sense, in newtons.
 const MAX_FORCE: f64 = 1e4;
