@@ -407,14 +407,14 @@ class Executor(Steering):
             first = k
             while first > 0 and bool((all_holds[first - 1] == all_holds[k]).all()):
                 first -= 1
-            # Between two fingers of which one takes over there is a short phase in which neither holds.
-            if k != self._k and (k + 1 - first) * self._plant.tick > HAND_OVER_TIME:
-                return False
             if first == 0:
                 if self._k == 0:
                     return False
                 k = 0
                 break
+            # Between two fingers of which one takes over there is a short phase in which neither holds.
+            if k != self._k and (k + 1 - first) * self._plant.tick > HAND_OVER_TIME:
+                return False
             k = first - 1
         self._event("no_start", message, "back")
         while self._k > k:
