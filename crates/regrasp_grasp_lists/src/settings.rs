@@ -1,7 +1,7 @@
 //! Settings of the search for grasp lists. Every default says where it comes from.
 
 use regrasp_grasp::list::{GraspKind, ScoreWeights};
-use regrasp_manipulation::settings::{ForceSettings, LEAST_CONE_WEIGHT, PhysicsSettings};
+use regrasp_manipulation::settings::{ForceSettings, PhysicsSettings};
 use serde::{Deserialize, Serialize};
 
 /// What is searched for, and how. Lengths in metres, angles in radians.
@@ -68,11 +68,7 @@ impl Default for GraspSettings {
             margin: 0.01,
             friction_margin: 1.5,
             weights: ScoreWeights::default(),
-            forces: ForceSettings {
-                normal_force: [0.5, 40.0],
-                cone_weight: LEAST_CONE_WEIGHT,
-                ..ForceSettings::default()
-            },
+            forces: ForceSettings { normal_force: [0.5, 40.0], cone_weight: 0.0, ..ForceSettings::default() },
             clearance: 0.0002,
             limit_margin: 0.01,
             first_finger: None,

@@ -1,7 +1,7 @@
 //! Settings of pick and place.
 
 use crate::motion_settings::{MotionMethod, PartsMove};
-use crate::settings::{ForceSettings, LEAST_CONE_WEIGHT};
+use crate::settings::ForceSettings;
 use serde::{Deserialize, Serialize};
 
 /// What a good plan of pick and place is.
@@ -139,7 +139,7 @@ impl Default for TaskSettings {
             forces: ForceSettings {
                 normal_force: [2.0, 40.0],
                 squeeze_weight: 1.0,
-                cone_weight: LEAST_CONE_WEIGHT,
+                cone_weight: 0.0,
                 ..ForceSettings::default()
             },
         }

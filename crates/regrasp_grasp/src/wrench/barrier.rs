@@ -7,10 +7,13 @@
 
 /// That no forces balance, shown by a direction.
 mod certificate;
+/// What the friction that a contact needs counts.
+mod needed_friction;
 /// One Newton step.
 mod newton_step;
 
 use arrayvec::ArrayVec;
+use needed_friction::NeededFriction;
 use newton_step::NewtonStep;
 
 /// Most contacts.
@@ -57,7 +60,7 @@ pub enum Limit {
     Joint(usize),
 }
 
-/// Minimise `sum |f_t - wish_t|^2 + weight (f_n - wish_n)^2` subject to `sum map f = balance` and all limits.
+/// Minimise `sum |f_t - wish_t|^2 + weight (f_n - wish_n)^2 + cones` times the friction that is needed, subject to `sum map f = balance` and all limits.
 #[derive(Debug, Clone)]
 pub struct Program<const D: usize> {
     /// Contacts. Their maps are orthonormal row by row, but for the rows from `rank` on, which are zero.
@@ -70,7 +73,7 @@ pub struct Program<const D: usize> {
     pub squeeze: f64,
     /// Weight of the wish for normal forces.
     pub weight: f64,
-    /// Weight of the barrier before the cones, against that before other limits; 1 or more.
+    /// Weight of the friction that contacts need, in newtons.
     cones: f64,
 }
 
@@ -111,8 +114,8 @@ const MAX_STEPS: usize = 100;
 
 impl<const D: usize> Program<D> {
     /// The program of these contacts, whose maps are not orthonormal yet. None where no forces whatever balance, as some
-    /// wrench is out of reach of all. Weights: of the wish for normal forces, and of the cones' barrier in squares of the squeeze, of which
-    /// less than [`BARRIER`] counts as that.
+    /// wrench is out of reach of all. Weights: of the wish for normal forces, and of the friction that contacts
+    /// need, in squeezes.
     pub fn new(
         mut blocks: ArrayVec<Block<D>, MAX_GRIPS>,
         mut balance: [f64; 6],
@@ -124,7 +127,7 @@ impl<const D: usize> Program<D> {
         let rank = orthonormalise(&mut blocks, &mut balance);
         let is_reached = balance[rank..].iter().all(|rest| rest.abs() <= 1e-9 * scale);
         balance[rank..].fill(0.0);
-        let cones = (cone_weight / BARRIER).max(1.0);
+        let cones = cone_weight * squeeze;
         is_reached.then_some(Program { blocks, balance, rank, squeeze, weight, cones })
     }
 
@@ -328,15 +331,9 @@ impl<const D: usize> Program<D> {
         rest
     }
 
-    /// Weight of the cones' barrier: without an objective all limits are alike.
-    fn cones_at(&self, wish: f64) -> f64 {
-        if wish > 0.0 { self.cones } else { 1.0 }
-    }
-
     /// Objective times `wish`, and the barrier with all limits moved out by `give`; None outside.
     fn value(&self, forces: &Forces<D>, give: f64, wish: f64) -> Option<f64> {
         let mut value = 0.0;
-        let cones = self.cones_at(wish);
         for (block, f) in self.blocks.iter().zip(forces) {
             let across: f64 = f[1..].iter().map(|x| x * x).sum();
             let off: f64 = f[1..].iter().zip(&block.wish[1..]).map(|(x, wished)| (x - wished) * (x - wished)).sum();
@@ -350,21 +347,22 @@ impl<const D: usize> Program<D> {
             };
             factor(f[0] - block.least + give);
             factor(block.largest - f[0] + give);
+            if block.friction > 0.0 {
+                let along = block.friction * f[0] - block.shift + give;
+                factor(if along > 0.0 { along * along - across } else { -1.0 });
+            }
             for (row, limit) in block.rows.iter().zip(&block.limits) {
                 let torque: f64 = row.iter().zip(f).map(|(a, b)| a * b).sum();
                 factor(limit - torque + give);
                 factor(limit + torque + give);
             }
-            if block.friction > 0.0 {
-                let along = block.friction * f[0] - block.shift + give;
-                let depth = if along > 0.0 { along * along - across } else { -1.0 };
-                is_inside &= depth > 0.0;
-                value -= cones * depth.max(f64::MIN_POSITIVE).ln();
-            }
             if !is_inside {
                 return None;
             }
             value -= product.ln();
+            if block.friction > 0.0 && wish * self.cones > 0.0 {
+                value += wish * self.cones * NeededFriction::of(block, f).value;
+            }
         }
         value.is_finite().then_some(value)
     }
@@ -458,7 +456,6 @@ impl<const D: usize> Point<D> {
     fn at(&mut self, program: &Program<D>, forces: &Forces<D>, give: f64, wish: f64) {
         self.step.clear();
         (self.give_slope, self.give_curvature) = (0.0, 0.0);
-        let cones = program.cones_at(wish);
         for (index, (block, f)) in program.blocks.iter().zip(forces).enumerate() {
             let mut descent = [0.0; D];
             let mut mixed = [0.0; D];
@@ -477,7 +474,10 @@ impl<const D: usize> Point<D> {
                 self.give_curvature += pull * pull;
             }
             if block.friction > 0.0 {
-                self.cone(block, f, (give, cones), &mut descent, &mut mixed, &mut hessian);
+                self.cone(block, f, give, &mut descent, &mut mixed, &mut hessian);
+                if wish * program.cones > 0.0 {
+                    NeededFriction::of(block, f).add(wish * program.cones, block, f, &mut descent, &mut hessian);
+                }
             }
             for (row, limit) in block.rows.iter().zip(&block.limits) {
                 let torque: f64 = row.iter().zip(f).map(|(a, b)| a * b).sum();
@@ -501,13 +501,13 @@ impl<const D: usize> Point<D> {
         self.step.factor(program.rank);
     }
 
-    /// The barrier `-weight log(u^2 - |v|^2)` with `u = friction f_n - shift + give`.
+    /// The barrier `-log(u^2 - |v|^2)` with `u = friction f_n - shift + give`.
     #[inline]
     fn cone(
         &mut self,
         block: &Block<D>,
         f: &Coordinates<D>,
-        (give, weight): (f64, f64),
+        give: f64,
         descent: &mut [f64; D],
         mixed: &mut [f64; D],
         hessian: &mut [[f64; D]; D],
@@ -520,20 +520,20 @@ impl<const D: usize> Point<D> {
         pull[0] = 2.0 * along * depth;
         (1..D).for_each(|i| pull[i] = -2.0 * f[i] * depth);
         let by_give = pull[0];
-        let twice = weight * (by_give * by_give - 2.0 * depth);
-        descent[0] += weight * block.friction * by_give;
+        let twice = by_give * by_give - 2.0 * depth;
+        descent[0] += block.friction * by_give;
         hessian[0][0] += block.friction * block.friction * twice;
         mixed[0] += block.friction * twice;
-        self.give_slope += weight * by_give;
+        self.give_slope += by_give;
         self.give_curvature += twice;
         for i in 1..D {
-            descent[i] += weight * pull[i];
-            mixed[i] += weight * pull[i] * by_give;
-            hessian[i][0] += weight * block.friction * pull[i] * by_give;
+            descent[i] += pull[i];
+            mixed[i] += pull[i] * by_give;
+            hessian[i][0] += block.friction * pull[i] * by_give;
             for j in 1..=i {
-                hessian[i][j] += weight * pull[i] * pull[j];
+                hessian[i][j] += pull[i] * pull[j];
             }
-            hessian[i][i] += weight * 2.0 * depth;
+            hessian[i][i] += 2.0 * depth;
         }
     }
 }

@@ -2,10 +2,11 @@
 //! torque limits.
 //!
 //! Of all such forces those with the least
-//! `sum |f_t|^2 + (m / e)^2 + weight (f_n - squeeze)^2` (tangential force, torsion over torsion radius, normal force),
-//! but for a barrier before every limit that keeps them strictly inside and makes them an analytic function of contacts,
-//! load and limits: along a plan they are smooth wherever these are. Before the cones it is as large as the caller says: of
-//! forces that all balance, those are better that stay far from where a contact slips. Before all others it is small. The objective is that of the notes on
+//! `sum |f_t|^2 + (m / e)^2 + weight (f_n - squeeze)^2 - cone_weight squeeze f_n log(1 - s^2)` (tangential force, torsion over
+//! torsion radius, normal force, share of its friction that a contact needs),
+//! but for a small fixed barrier before every limit that keeps them strictly inside and makes them an analytic function
+//! of contacts, load and limits: along a plan they are smooth wherever these are. The last term keeps them away from where a
+//! contact slips, which those of the least effort are next to. The objective is that of the notes on
 //! physics (replays in MuJoCo); Buss, Hashimoto, Moore, *Dextrous hand grasping force optimization*, IEEE T-RA 12 (1996),
 //! minimise over the same cones with the same kind of barrier.
 //!
@@ -102,8 +103,7 @@ pub struct ForceLimits {
     pub squeeze: f64,
     /// What a square of a newton beside that counts, against one of tangential force.
     pub squeeze_weight: f64,
-    /// Weight of a logarithmic barrier before the friction cones, in squares of the squeeze: the larger, the farther forces stay from where
-    /// contacts slip. At least that of all other limits, 0.001; less counts as that.
+    /// Weight of the friction that contacts need, in squeezes: the larger, the farther forces stay from where contacts slip; 0 or more.
     pub cone_weight: f64,
 }
 

@@ -18,9 +18,9 @@ pub struct ForceSettings {
     /// Weight of the squared deviation from `squeeze`, against one squared newton of tangential force. Origin:
     /// simulation of a prototype.
     pub squeeze_weight: f64,
-    /// Weight of staying away from friction cones, in squares of the squeeze: of a logarithmic barrier before every cone. The larger, the more
-    /// friction may be missing before a contact slips; 0.001 is as good as none. Origin: replays and chains of goals with less friction than the
-    /// plan counts on (docs/benchmarks/forces.md).
+    /// Weight of the friction that contacts need, in squeezes: of normal force times `-log(1 - s^2)`, where a contact needs the share `s` of the
+    /// friction that is counted on. The larger, the more friction may be missing before a contact slips. Origin: how much friction plans need, and
+    /// how hard fingers press (docs/benchmarks/forces.md).
     pub cone_weight: f64,
     /// Least and largest normal force of a holding finger, in newtons. Origin: simulation of a prototype; below 2 N
     /// contacts were lost.
@@ -35,7 +35,7 @@ impl Default for ForceSettings {
         ForceSettings {
             squeeze: 4.0,
             squeeze_weight: 0.2,
-            cone_weight: 0.3,
+            cone_weight: 1.0,
             normal_force: [2.0, 15.0],
             torque_share: 1.0,
         }
@@ -61,8 +61,8 @@ impl ForceSettings {
         if !(squeeze_weight > 0.0 && squeeze_weight <= 1e3) {
             return Err(format!("forces.squeeze_weight is {squeeze_weight}; it must be above 0 and at most 1000"));
         }
-        if !(LEAST_CONE_WEIGHT..=1e3).contains(&cone_weight) {
-            return Err(format!("forces.cone_weight is {cone_weight}; it must be between 0.001 and 1000"));
+        if !(0.0..=1e3).contains(&cone_weight) {
+            return Err(format!("forces.cone_weight is {cone_weight}; it must be between 0 and 1000"));
         }
         if !(torque_share > 0.0 && torque_share <= 1.0) {
             return Err(format!("forces.torque_share is {torque_share}; it must be above 0 and at most 1"));
@@ -71,7 +71,5 @@ impl ForceSettings {
     }
 }
 
-/// Weight of the cones with which forces may come as near to them as to any other limit.
-pub const LEAST_CONE_WEIGHT: f64 = 1e-3;
 /// Largest force of a finger that makes sense, in newtons.
 const MAX_FORCE: f64 = 1e4;

@@ -7,6 +7,6 @@ mod physics;
 /// Times.
 mod speed;
 
-pub use forces::{ForceSettings, LEAST_CONE_WEIGHT};
+pub use forces::ForceSettings;
 pub use physics::{PhysicsSettings, TransferMode};
 pub use speed::SpeedSettings;

@@ -225,7 +225,7 @@ mod tests {
         torque_scale: 0.1,
         friction: 0.6,
         sliding_friction: 0.7,
-        limits: ForceLimits { least: 0.1, largest: 60.0, squeeze: 4.0, squeeze_weight: 0.2, cone_weight: 1e-3 },
+        limits: ForceLimits { least: 0.1, largest: 60.0, squeeze: 4.0, squeeze_weight: 0.2, cone_weight: 0.0 },
         cones: Cones::Pyramid,
     };
     const EXACT: Load = Load { cones: Cones::Exact, ..LOAD };

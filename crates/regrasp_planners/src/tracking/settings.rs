@@ -1,7 +1,7 @@
 //! Settings of finger tracking. Lengths in metres, angles in radians, velocities per second.
 
 use crate::settings::InHandSettings;
-use regrasp_manipulation::settings::{ForceSettings, LEAST_CONE_WEIGHT};
+use regrasp_manipulation::settings::ForceSettings;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
@@ -177,12 +177,12 @@ impl Default for TrackingSettings {
     }
 }
 
-/// `settings` with another friction margin and other limits of the normal forces, that may come near to the cones: forces of fingertips that
+/// `settings` with another friction margin and other limits of the normal forces, whatever friction they need: forces of fingertips that
 /// roll and slide are chosen by their power.
 fn with_forces(mut settings: InHandSettings, friction_margin: f64, normal_force: [f64; 2]) -> InHandSettings {
     let forces = settings.physics.forces.unwrap_or_default();
     settings.physics.friction_margin = friction_margin;
-    settings.physics.forces = Some(ForceSettings { normal_force, cone_weight: LEAST_CONE_WEIGHT, ..forces });
+    settings.physics.forces = Some(ForceSettings { normal_force, cone_weight: 0.0, ..forces });
     settings
 }
 
