@@ -11,7 +11,7 @@ use std::time::Instant;
 const FRAME: GraspFrame =
     GraspFrame { center_of_mass: Point::new(0.001, -0.002, 0.003), torque_scale: 0.03, friction: 0.53 };
 const LIMITS: ForceLimits =
-    ForceLimits { least: 2.0, largest: 15.0, squeeze: 4.0, squeeze_weight: 0.2, cone_weight: 0.0 };
+    ForceLimits { least: 2.0, largest: 15.0, squeeze: 4.0, squeeze_weight: 0.2, cone_weight: 1.0 };
 
 /// A grasp and what it carries.
 struct Set {

@@ -34,7 +34,8 @@ class ExecutorSessions:
         def opened(kind: Mapping[str, Any]) -> Session:
             return Session(scene, settings=planner_settings(kind, work_share(hand)))
 
-        return cls(opened(usual_settings(moved)), tuple(opened(kind) for kind in careful_settings(moved)), opened(loose_settings(moved)), opened(FIRM), opened(ANEW))
+        careful = tuple(opened(kind) for kind in careful_settings(moved))
+        return cls(opened(usual_settings(moved)), careful, opened(loose_settings(moved)), opened(FIRM), opened(ANEW))
 
 
 def planner_settings(settings: Mapping[str, Any], share: float) -> dict[str, Any]:

@@ -40,7 +40,7 @@ CLEAR_ROUND: dict[str, Any] = {**CAREFUL_ROUND, "clearance": 0.0006}
 #: ``PLANNER`` for starts that are worse than plans may be: links may be nearer to what they must not touch, grasps may hold less.
 LOOSE: dict[str, Any] = {**PLANNER, "clearance": 2e-5, "closure_margin": 0.001}
 #: The same with the grip of ``FIRMER``, for objects with edges.
-LOOSE_EDGED: dict[str, Any] = {**FIRMER, "clearance": 2e-5, "closure_margin": 0.001}
+LOOSE_EDGED: dict[str, Any] = {**LOOSE, "forces": FIRMER["forces"]}
 #: ``PLANNER`` with more room for friction and a firmer grip: legs are planned with these first where ``grip`` says so. Origin: pushes of 4 N on the bundled box.
 FIRM: dict[str, Any] = {**PLANNER, "friction_margin": 2.0, "forces": {"squeeze": 12.0, "normal_force": [2.0, 30.0]}}
 #: ``FIRMER`` with a better grasp at the end: so the hand takes hold of the object anew, where no plan leads on from the present grasp.

@@ -60,7 +60,8 @@ pub enum Limit {
     Joint(usize),
 }
 
-/// Minimise `sum |f_t - wish_t|^2 + weight (f_n - wish_n)^2 + cones` times the friction that is needed, subject to `sum map f = balance` and all limits.
+/// Minimise `sum |f_t - wish_t|^2 + weight (f_n - wish_n)^2 + cones needed` subject to `sum map f = balance` and all limits, with the friction that
+/// is needed as [`NeededFriction`] counts it.
 #[derive(Debug, Clone)]
 pub struct Program<const D: usize> {
     /// Contacts. Their maps are orthonormal row by row, but for the rows from `rank` on, which are zero.

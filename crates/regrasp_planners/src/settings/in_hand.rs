@@ -170,6 +170,7 @@ mod tests {
                 "forces.squeeze is 1; it must be above 0 and between the normal forces 2 and 15 N",
             ),
             (r#"{"forces": {"torque_share": 1.5}}"#, "forces.torque_share is 1.5; it must be above 0 and at most 1"),
+            (r#"{"forces": {"cone_weight": -1}}"#, "forces.cone_weight is -1; it must be between 0 and 1000"),
             (r#"{"forces": {"squeeze_weight": 0}}"#, "forces.squeeze_weight is 0; it must be above 0 and at most 1000"),
             (r#"{"speed": {"largest_speed": 0}}"#, "speed.largest_speed is 0; it must be between 0.000001 and 1000000"),
             (r#"{"step": 3e-9}"#, "step is 0.000000003; it must be at least 0.00001"),
