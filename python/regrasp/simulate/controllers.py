@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
-from .model import Rig, Settings, angular_jacobians, contact_jacobians, gravity_of, inverses, normals_in_world
+from .model import Rig, Settings, angular_jacobians, contact_jacobians, forces_in_world, gravity_of, inverses, normals_in_world
 from .reference import Array, Reference, held_at_waypoints, rotation_matrices, waypoints_of
 from .torsion import Spinning, least_forces, spinning
 
@@ -17,6 +18,8 @@ RETURN_SPEED = 0.005
 #: Controller H: share of a tip's stiffness along the normal that is taken away. A tip that slides, or stands where the object
 #: slides over it, must press as planned wherever the object is (hybrid control: Raibert, Craig 1981).
 NORMAL_GIVE = 0.9
+#: Forces turn with the object up to this angle, in radians: an object that is farther off is not where they were planned for.
+LARGEST_TURN = 0.2
 #: Time in which a free finger takes up the error of the object, in seconds.
 FREE_FOLLOW_TIME = 0.05
 
@@ -57,6 +60,8 @@ class Controller:
     def feedback(self, rig: Rig, ref: Reference, settings: Settings) -> Feedback:
         """A fresh feedback loop over these commands."""
         feedback = Feedback(rig, ref, settings, self.commands, self._inverses, self._contacts)
+        if settings.forces_turn:
+            feedback.turn_forces(_torques_of_turns(rig, self._jacobians))
         if settings.controller == "H":
             feedback.give(NORMAL_GIVE, rig, self._jacobians)
         return feedback
@@ -69,6 +74,11 @@ class Feedback:
     displacement of the real object from the planned one, so that it lands where it should on the real object; offsets are
     continuous over landing and lifting. No finger presses less than planned: where friction holds the object in a wrong pose,
     a finger that retreats would only lose its contact.
+
+    Forces turn with the object, where it is turned from its plan. Forces that two fingers press with from opposite sides, and that keep
+    their directions in the world, turn an object on that is turned a little, by their moment 2 f r sin(angle) at the distance 2 r. Only the
+    stiffness k of the fingers holds against that, by 2 k r^2 angle: not where f > k r. Forces that turn with the object have no such moment, and
+    stay in their friction cones (stiffness of a grasp by its forces: Cutkosky, Kao 1989).
 
     H: beside that, targets of pressing tips follow the tips along the normal by the share `give`.
     """
@@ -94,12 +104,18 @@ class Feedback:
         self._gain = pressing * (settings.feedback_gain * settings.tick) - self._leak
         self._return = RETURN_SPEED * settings.tick
         self._offsets = np.zeros((len(rig.fingers), 3))
+        self._turning: Array | None = None
         self._give = 0.0
         self._jacobians = np.zeros(0)
         self._joint_qpos = np.zeros(0, dtype=np.int64)
         self._pressing = ref.presses.astype(np.float64)
         self._position = slice(rig.object_qpos, rig.object_qpos + 3)
         self._quat = slice(rig.object_qpos + 3, rig.object_qpos + 7)
+
+    def turn_forces(self, at_waypoints: Array) -> None:
+        """Adds the torques ``at_waypoints @ turn`` where the object is turned from its plan by the rotation vector ``turn``; shape
+        (n_waypoints, n_joints, 3)."""
+        self._turning = self._ref.blend(at_waypoints)
 
     def give(self, share: float, rig: Rig, jacobians: Array) -> None:
         """Takes ``share`` of the stiffness along the normal from pressing tips."""
@@ -136,11 +152,16 @@ class Feedback:
         np.maximum(-LARGEST_OFFSET, np.minimum(LARGEST_OFFSET, offsets + change), out=offsets)
         too_far = (offsets * normals).sum(axis=1) - limits
         offsets -= np.maximum(too_far, 0.0)[:, None] * normals
+        shifted = offsets
         if self._give > 0.0:
             moved = self._jacobians[ref.waypoint[k]] @ (qpos[self._joint_qpos] - ref.joints[k])
             given = self._give * self._pressing[k] * ((moved - offsets) * normals).sum(axis=1)
-            return self._commands[k] + self._inverse[ref.waypoint[k]] @ (offsets + given[:, None] * normals).ravel()
-        return self._commands[k] + self._inverse[ref.waypoint[k]] @ offsets.ravel()
+            shifted = offsets + given[:, None] * normals
+        command = self._commands[k] + self._inverse[ref.waypoint[k]] @ shifted.ravel()
+        if self._turning is not None:
+            share = min(1.0, LARGEST_TURN / max(math.sqrt(a * a + b * b + c * c), 1e-12))
+            command += self._turning[k] @ np.array((-share * a, -share * b, -share * c))
+        return command
 
 
 def _turn(to: Array, from_: Array) -> tuple[float, float, float]:
@@ -176,6 +197,15 @@ def _torques(rig: Rig, jacobians: Array, contacts: Array, settings: Settings) ->
         forces = least_forces(contacts[k][held[k]] - _place(pose, center), lift, np.zeros(3))
         torques[k] += np.einsum("fij,fi->j", jacobians[k][held[k]], forces)
     return torques
+
+
+def _torques_of_turns(rig: Rig, jacobians: Array) -> Array:
+    """Torques that turn the plan's contact forces, over the rotation vector that they turn by, at every waypoint: shape (n_waypoints,
+    n_joints, 3). For small angles: the force f becomes f + turn x f."""
+    x, y, z = np.moveaxis(forces_in_world(rig.plan), -1, 0)
+    zero = np.zeros(x.shape)
+    turned = np.stack([np.stack(row, axis=-1) for row in ((zero, z, -y), (-z, zero, x), (y, -x, zero))], axis=-2)
+    return np.einsum("kfij,kfil->kjl", jacobians, turned)
 
 
 def _against_torsion(rig: Rig, jacobians: Array, spin: Spinning) -> Array:

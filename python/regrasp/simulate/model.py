@@ -55,6 +55,8 @@ class Settings:
     """How far controller A pushes its targets into the object, in metres."""
     feedback_gain: float = 2.0
     """Of C2, per second."""
+    forces_turn: bool = True
+    """Of C2: forces turn with the object where it is turned from its plan. Else they keep their directions in the world."""
     stiffness_scale: float = 1.0
     """Factor of the joints' stiffness and damping."""
     tick: float = 0.004
@@ -283,6 +285,16 @@ def normals_in_world(plan: Plan) -> Array:
         [[contact.get("normal_in_object") or (0.0, 0.0, 0.0) for contact in point["contacts"]] for point in points]
     )
     return np.einsum("kij,kfj->kfi", turns, normals)
+
+
+def forces_in_world(plan: Plan) -> Array:
+    """Forces of the fingers on the object as planned, in newtons, zero where they are free or the plan has none: shape (n_waypoints,
+    n_fingers, 3)."""
+    points = waypoints_of(plan)
+    xyzw = np.array([point["world_from_object"]["quat_xyzw"] for point in points])
+    turns = rotation_matrices(xyzw[:, [3, 0, 1, 2]])
+    forces = np.array([[contact.get("force_in_object") or (0.0, 0.0, 0.0) for contact in point["contacts"]] for point in points])
+    return np.einsum("kij,kfj->kfi", turns, forces)
 
 
 def _apply(rig: Rig, settings: Settings) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._mujoco import mujoco
-from .model import Rig, normals_in_world
+from .model import Rig, forces_in_world, normals_in_world
 from .reference import Array, Plan, held_at_waypoints, rotation_matrices, waypoints_of
 
 #: Angle of spin at which the moment of a contact is full, in radians. By hand: about as much as a fingertip's joints give.
@@ -28,6 +28,12 @@ LEAST_ROOM = 0.3
 #: A tip that slides goes back to its planned place on the object by this share of its planned way at most: friction still points as
 #: planned. By hand.
 RETURN_SHARE = 0.5
+#: Of a wrench: torques in units of a finger's width, so that both halves count alike.
+SCALE = np.repeat((1.0, 30.0), 3)
+#: Projections onto friction cones, at most,
+MOST_PROJECTIONS = 200
+#: or until forces change by less, in newtons.
+NEAR_ENOUGH = 1e-3
 
 
 def spins(rig: Rig) -> Array:
@@ -117,8 +123,7 @@ def spinning(rig: Rig, contacts: Array, told: float | None = None) -> Spinning:
     held = held_at_waypoints(rig.plan)
     xyzw = np.array([point["world_from_object"]["quat_xyzw"] for point in points])
     turns = rotation_matrices(xyzw[:, [3, 0, 1, 2]])
-    planned = np.array([[contact.get("force_in_object") or (0.0,) * 3 for contact in point["contacts"]] for point in points])
-    planned = np.einsum("kij,kfj->kfi", turns, planned)
+    planned = forces_in_world(rig.plan)
     push = -np.einsum("kfi,kfi->kf", planned, normals)
     spun = spins(rig)
     share = saturations(spun, held)
@@ -131,12 +136,18 @@ def spinning(rig: Rig, contacts: Array, told: float | None = None) -> Spinning:
         return across, np.sqrt(np.maximum(push**2 - taken**2, (LEAST_ROOM * push) ** 2))
 
     moments = share * torsion * room(planned)[1]
-    added = np.zeros(planned.shape)
     center = np.array(rig.model.body_ipos[rig.object_body])
-    for k, point in enumerate(points):
-        arms = contacts[k][held[k]] - (np.array(point["world_from_object"]["position"]) + turns[k] @ center)
+    positions = np.array([point["world_from_object"]["position"] for point in points])
+    arms = contacts - (positions + turns @ center)[:, None, :]
+    added = np.zeros(planned.shape)
+    # Forces of a tip that slides lie on their cones, and what is added to them says itself where they go.
+    sticks = ~np.array([any(contact["mode"] == "sliding" for contact in point["contacts"]) for point in points])
+    for k in np.flatnonzero(np.abs(moments).max(axis=1) > 0.0):
         torque = -(moments[k][:, None] * normals[k]).sum(axis=0)
-        added[k][held[k]] = least_forces(arms, np.zeros(3), torque)
+        added[k][held[k]] = least_forces(arms[k][held[k]], np.zeros(3), torque)
+        if sticks[k]:
+            cones = Cones(normals[k][held[k]], float(rig.plan["promises"]["friction"]), float(np.min(push[k][held[k]])))
+            added[k][held[k]] = forces_in_cones(planned[k][held[k]], added[k][held[k]], arms[k][held[k]], cones)
     across, left = room(planned + added)
     rate = torsion * slippery**2 / np.maximum(left, 1e-9)
     step = (np.abs(spun) * share**2 * rate)[:, :, None] * across
@@ -150,6 +161,52 @@ def spinning(rig: Rig, contacts: Array, told: float | None = None) -> Spinning:
         slips[k][returns] = slips[k - 1][returns] * share_left[returns][:, None]
         slips[k][~held[k]] = 0.0
     return Spinning(moments, added, slips)
+
+
+@dataclass(frozen=True)
+class Cones:
+    """Where forces may be so that contacts stick."""
+
+    normals: Array
+    """Out of the object; shape (n, 3)."""
+    friction: float
+    """That the plan counts on."""
+    least: float
+    """Normal force, in newtons."""
+
+    def nearest(self, forces: Array) -> Array:
+        """The forces inside that are nearest to these."""
+        along = -(forces * self.normals).sum(axis=1)
+        across = forces + along[:, None] * self.normals
+        length = np.linalg.norm(across, axis=1)
+        # Onto the cone where it is outside, or onto its cut at the least normal force.
+        beyond = np.maximum(0.0, length - self.friction * along)
+        onto = np.maximum(self.least, along + self.friction * beyond / (1.0 + self.friction**2))
+        share = np.minimum(1.0, self.friction * onto / np.maximum(length, 1e-12))
+        return share[:, None] * across - onto[:, None] * self.normals
+
+
+def forces_in_cones(planned: Array, added: Array, arms: Array, cones: Cones) -> Array:
+    """Of all forces that have the same sum and moments as ``added`` those that, added to ``planned``, stay in the cones, and change
+    ``planned`` least. Where there are none, those that leave the cones least.
+
+    By projections onto both sets in turn, corrected so that they find the nearest point of their intersection (Boyle, Dykstra 1986).
+    """
+    grasp = _grasp_matrix(arms)
+    inverse = np.linalg.pinv(grasp)
+    wrench = grasp @ (planned + added).ravel()
+
+    def balanced(forces: Array) -> Array:
+        return forces - (inverse @ (grasp @ forces.ravel() - wrench)).reshape(-1, 3)
+
+    forces, correction = planned + added, np.zeros(planned.shape)
+    for _ in range(MOST_PROJECTIONS):
+        inside = cones.nearest(forces + correction)
+        correction = forces + correction - inside
+        before, forces = forces, balanced(inside)
+        if np.abs(forces - before).max() < NEAR_ENOUGH:
+            break
+    return forces - planned
 
 
 def _planned_slides(plan: Plan) -> Array:
@@ -170,11 +227,13 @@ def _sliding_speed(contact: dict[str, Any]) -> float:
 
 def least_forces(arms: Array, force: Array, torque: Array) -> Array:
     """Least forces at ``arms`` from the centre of mass that sum up to ``force``, and to ``torque`` about it."""
+    return (np.linalg.pinv(_grasp_matrix(arms)) @ (np.concatenate((force, torque)) * SCALE)).reshape(-1, 3)
+
+
+def _grasp_matrix(arms: Array) -> Array:
+    """Sum and moments of forces at ``arms``, times ``SCALE``."""
     grasp = np.zeros((6, 3 * len(arms)))
     for f, (x, y, z) in enumerate(arms):
         grasp[:3, 3 * f : 3 * f + 3] = np.eye(3)
         grasp[3:, 3 * f : 3 * f + 3] = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
-    wrench = np.concatenate((force, torque))
-    # Torques in units of a finger's width, so that both halves count alike.
-    scale = np.repeat((1.0, 30.0), 3)
-    return (np.linalg.pinv(grasp * scale[:, None]) @ (wrench * scale)).reshape(-1, 3)
+    return grasp * SCALE[:, None]
