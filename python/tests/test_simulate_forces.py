@@ -66,6 +66,34 @@ def test_forces_turn_with_the_object_as_far_as_it_is_turned_and_no_farther() -> 
         )
 
 
+def test_fingers_that_press_harder_move_nothing_and_spare_their_motors() -> None:
+    """What is added are forces without a sum or moments, as far as the motors have them: by projection onto the forces that have none."""
+    plan, xml = planned("box_90x", 1)
+    rig = make_rig(xml, plan, Settings(controller="C2"))
+    jacobians, contacts = contact_jacobians(rig)
+    forces, held, ref = forces_in_world(plan), held_at_waypoints(plan), reference(plan)
+    inner = np.zeros(forces.shape)
+    for k in range(len(forces)):
+        rows = _sums(contacts[k][held[k]])
+        inner[k][held[k]] = ((np.eye(rows.shape[1]) - np.linalg.pinv(rows) @ rows) @ forces[k][held[k]].ravel()).reshape(-1, 3)
+    torques = np.einsum("kfij,kfi->kj", jacobians, inner)
+    planned_torques = np.array([point["joint_torques"] for segment in plan["segments"] for point in segment["waypoints"]])
+    assert np.abs(inner).max() > 1.0
+    for k in (0, ref.n_ticks // 3, ref.n_ticks - 1):
+        commands: list[np.ndarray] = []
+        for extra in (0.0, 0.25, 50.0):
+            feedback = Controller(rig, ref, Settings(controller="C2")).feedback(rig, ref, Settings(controller="C2"))
+            feedback.extra = extra
+            qpos = rig.configurations[0].copy()
+            first = rig.object_qpos
+            qpos[first : first + 3], qpos[first + 3 : first + 7] = ref.object_position[k], ref.object_quat_wxyz[k]
+            commands.append(feedback.command(k, qpos))
+        assert np.abs(commands[1] - commands[0] - 0.25 * ref.blend(torques)[k]).max() < 1e-6
+        # However hard it is asked to, no motor is told more than its plan may: 1 N m here. One of them is.
+        most = np.abs(commands[2] - commands[0] + ref.blend(planned_torques)[k]).max()
+        assert 0.97 < most < 1.0 + 1e-9
+
+
 @pytest.mark.parametrize("name", ["box_90x", "sphere_90x"])
 def test_soft_fingers_that_press_hard_turn_the_object_out_unless_forces_turn_with_it(name: str) -> None:
     plan, xml = planned(name, 2, forces={"squeeze": 6.0})

@@ -39,12 +39,14 @@ DISTURBANCES: dict[str, dict[str, Any]] = {
 ABLATIONS: dict[str, dict[str, Any]] = {
     "both": {},
     "both, no slip trigger": {"slip_trigger": False},
+    "both, no reflex": {"reflex_press": 0.0},
     "replanning alone": {"feedback": False},
-    "feedback alone": {"replanning": False},
+    "feedback alone": {"replanning": False, "reflex_press": 0.0},
+    "feedback and reflex": {"replanning": False},
     "open loop": {"replanning": False, "feedback": False},
     "both, firm after trouble": {"grip": "firm after trouble"},
     "both, firm grip": {"grip": "firm"},
-    "feedback alone, firm grip": {"replanning": False, "grip": "firm"},
+    "feedback alone, firm grip": {"replanning": False, "reflex_press": 0.0, "grip": "firm"},
 }
 
 

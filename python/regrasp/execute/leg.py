@@ -12,7 +12,7 @@ from .._plan import Plan
 from .._planning import export_mjcf
 from ..simulate._mujoco import mujoco
 from ..simulate.controllers import Controller, Feedback
-from ..simulate.model import Rig, Settings, make_rig, normals_in_world, with_plan
+from ..simulate.model import Rig, Settings, forces_in_world, make_rig, normals_in_world, with_plan
 from ..simulate.plans import flat
 from ..simulate.reference import Array, Reference, reference, rotation_matrices
 from .plant import Command
@@ -46,6 +46,9 @@ class Leg:
         self._twists = _object_twists(self.rig, self.ref, jacobians, contacts)
         self._tips = self.ref.blend(_tips_in_object(self.rig))
         self._normals = self.ref.blend(_normals_in_object(self.rig))
+        pushes = -np.einsum("kfi,kfi->kf", forces_in_world(self.rig.plan), normals_in_world(self.rig.plan))
+        self.normal_forces: Array = self.ref.blend(pushes)
+        """Normal force of every finger as planned, at every tick, in newtons."""
         self._qpos = self.rig.configurations[0].copy()
         self._data: Any = mujoco.MjData(self.rig.model)
         model = self.rig.model

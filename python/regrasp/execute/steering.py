@@ -14,6 +14,7 @@ from .leg import Leg
 from .log import Event, GoalResult, RunLog, Sample
 from .monitor import Monitor, pose_error, why_gone
 from .plant import Command, Plant
+from .reflex import Reflex
 from .senses import Fault, Senses
 from .settings import ExecutorSettings
 
@@ -46,6 +47,7 @@ class Steering:
         self._truth: Callable[[], tuple[Array, Array]] | None = getattr(plant, "truth", None)
         self._grips_firmer = settings.grip == "firm"
         self._senses = Senses(len(plant.joint_names), settings)
+        self._reflex = Reflex(settings)
         self._current: list[Fault] = []
         self._leg: Leg | None = None
         self._k = 0
@@ -139,6 +141,7 @@ class Steering:
         if leg is None:
             self._wait()
         else:
+            self._feel(leg)
             servo = leg.command(self._k, self._senses.position, self._senses.quat, moves=moves)
             if self._blended < 1.0 and self._blend_from is not None:
                 self._blended = min(1.0, self._blended + self._plant.tick / self._settings.blend_time)
@@ -154,6 +157,15 @@ class Steering:
         if self._is_withdrawn is not None and self._is_withdrawn():
             raise Withdrawn
         return self._current
+
+    def _feel(self, leg: Leg) -> None:
+        """Presses harder where fingertips feel a sudden change."""
+        if leg.feedback is None:
+            return
+        senses = self._senses
+        if self._reflex.look(senses.time, leg, self._k, senses.forces, blends=self._blended < 1.0):
+            self._event("sudden_force", "a fingertip feels a sudden change", "grip")
+        leg.feedback.extra = self._reflex.extra
 
     def _resting(self) -> Command:
         assert self._last_command is not None

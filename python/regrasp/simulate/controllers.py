@@ -37,6 +37,7 @@ class Controller:
         if settings.controller != "A" and settings.torsion_told != 0.0:
             spin = spinning(rig, contacts, settings.torsion_told)
             torques = torques + _against_torsion(rig, jacobians, spin)
+        self._planned_torques = torques
         self.torques = ref.blend(torques)
         """Fed forward, at every tick."""
         targets = ref.joints
@@ -60,6 +61,8 @@ class Controller:
     def feedback(self, rig: Rig, ref: Reference, settings: Settings) -> Feedback:
         """A fresh feedback loop over these commands."""
         feedback = Feedback(rig, ref, settings, self.commands, self._inverses, self._contacts)
+        pressing = _pressing_torques(rig, self._jacobians, self._contacts)
+        feedback.press_by(pressing, _room_for(pressing, self._planned_torques, rig))
         if settings.forces_turn:
             feedback.turn_forces(_torques_of_turns(rig, self._jacobians))
         if settings.controller == "H":
@@ -105,12 +108,22 @@ class Feedback:
         self._return = RETURN_SPEED * settings.tick
         self._offsets = np.zeros((len(rig.fingers), 3))
         self._turning: Array | None = None
+        self._pressing_by: Array | None = None
+        self._most_extra = np.zeros(0)
+        self.extra = 0.0
+        """How much harder fingers press than planned, in shares of the forces that they press with."""
         self._give = 0.0
         self._jacobians = np.zeros(0)
         self._joint_qpos = np.zeros(0, dtype=np.int64)
         self._pressing = ref.presses.astype(np.float64)
         self._position = slice(rig.object_qpos, rig.object_qpos + 3)
         self._quat = slice(rig.object_qpos + 3, rig.object_qpos + 7)
+
+    def press_by(self, at_waypoints: Array, most: Array) -> None:
+        """Takes over the torques of the forces that fingers press with, shape (n_waypoints, n_joints), and how many times more of them the
+        motors have, shape (n_waypoints,)."""
+        self._pressing_by = self._ref.blend(at_waypoints)
+        self._most_extra = self._ref.blend(most)
 
     def turn_forces(self, at_waypoints: Array) -> None:
         """Adds the torques ``at_waypoints @ turn`` where the object is turned from its plan by the rotation vector ``turn``; shape
@@ -158,9 +171,12 @@ class Feedback:
             given = self._give * self._pressing[k] * ((moved - offsets) * normals).sum(axis=1)
             shifted = offsets + given[:, None] * normals
         command = self._commands[k] + self._inverse[ref.waypoint[k]] @ shifted.ravel()
+        extra = 0.0 if self.extra == 0.0 else min(self.extra, float(self._most_extra[k]))
         if self._turning is not None:
-            share = min(1.0, LARGEST_TURN / max(math.sqrt(a * a + b * b + c * c), 1e-12))
+            share = min(1.0, LARGEST_TURN / max(math.sqrt(a * a + b * b + c * c), 1e-12)) * (1.0 + extra)
             command += self._turning[k] @ np.array((-share * a, -share * b, -share * c))
+        if extra > 0.0 and self._pressing_by is not None:
+            command += extra * self._pressing_by[k]
         return command
 
 
@@ -206,6 +222,27 @@ def _torques_of_turns(rig: Rig, jacobians: Array) -> Array:
     zero = np.zeros(x.shape)
     turned = np.stack([np.stack(row, axis=-1) for row in ((zero, z, -y), (-z, zero, x), (y, -x, zero))], axis=-2)
     return np.einsum("kfij,kfil->kjl", jacobians, turned)
+
+
+def _pressing_torques(rig: Rig, jacobians: Array, contacts: Array) -> Array:
+    """Torques of the forces that fingers press against each other with, at every waypoint: of the planned forces without the least ones that
+    have the same sum and moments."""
+    forces, held = forces_in_world(rig.plan), held_at_waypoints(rig.plan)
+    center = np.array(rig.model.body_ipos[rig.object_body])
+    for k, point in enumerate(waypoints_of(rig.plan)):
+        arms, pressing = contacts[k][held[k]] - _place(point["world_from_object"], center), forces[k][held[k]]
+        forces[k][held[k]] -= least_forces(arms, pressing.sum(axis=0), np.cross(arms, pressing).sum(axis=0))
+    return np.einsum("kfij,kfi->kj", jacobians, forces)
+
+
+def _room_for(pressing: Array, torques: Array, rig: Rig) -> Array:
+    """How many times ``pressing`` fits between torques and the limits that the plan counts on, at every waypoint."""
+    promised: dict[str, Any] = rig.plan["promises"].get("forces") or {}
+    limits: list[float | None] = promised.get("joint_torques") or [None] * pressing.shape[1]
+    most = np.array([np.inf if limit is None else limit for limit in limits])
+    room = np.maximum(0.0, most - np.sign(pressing) * torques) / np.maximum(np.abs(pressing), 1e-9)
+    # An infinity between two waypoints would be no number.
+    return np.minimum(room.min(axis=1), 1e3)
 
 
 def _against_torsion(rig: Rig, jacobians: Array, spin: Spinning) -> Array:
