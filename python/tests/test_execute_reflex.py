@@ -29,7 +29,7 @@ class Hand:
 
     planned: Any
     holds: Any
-    settings: ExecutorSettings = ExecutorSettings()
+    settings: ExecutorSettings = ExecutorSettings(reflex_press=1.0)
 
     def __post_init__(self) -> None:
         self.leg: Any = SimpleNamespace(normal_forces=self.planned, ref=SimpleNamespace(holds=self.holds))
@@ -56,8 +56,8 @@ def test_a_jump_of_a_force_makes_the_hand_press_harder_for_a_while() -> None:
     planned, holds = constant()
     felt = planned + 0.3
     felt[50:, 1] -= 2.0
-    settings = ExecutorSettings()
-    ticks, extra = Hand(planned, holds).told(felt)
+    settings = ExecutorSettings(reflex_press=1.0)
+    ticks, extra = Hand(planned, holds, settings).told(felt)
     assert ticks == [50]
     assert extra[49] == 0.0 and extra[50] == settings.reflex_press
     # As long as the change is in the window it counts anew; not while that has two presses in it.
@@ -90,7 +90,7 @@ def test_what_is_no_sudden_change_is_left_alone() -> None:
     for plan, felt, how in quiet:
         ticks, extra = Hand(plan, holds).told(felt, **how)
         assert not ticks and not any(extra)
-    ticks, extra = Hand(planned, holds, ExecutorSettings(reflex_press=0.0)).told(jump)
+    ticks, extra = Hand(planned, holds, ExecutorSettings()).told(jump)
     assert not ticks and not any(extra)
     # The same jump is felt where nothing of that is so.
     assert Hand(planned, holds).told(jump)[0] == [50]
@@ -101,7 +101,7 @@ def run(reflex: bool) -> tuple[RunLog, int]:
     scene = regrasp.load_scene(SCENES / "box_90x.toml")
     simulation = Settings(hold_time=0.0, friction_scale=0.5)
     plant = MujocoPlant.of(scene, PlantSettings(simulation=simulation, push=4.0, seed=0), seed=0, max_work=5_000_000)
-    settings = ExecutorSettings() if reflex else ExecutorSettings(reflex_press=0.0)
+    settings = ExecutorSettings(reflex_press=1.0) if reflex else ExecutorSettings()
     log = Executor.of(ExecutorSessions.of(scene), plant, settings).run(turns(plant.pose, count=5, seed=0))
     return log, plant.touching()
 

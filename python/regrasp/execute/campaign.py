@@ -39,14 +39,15 @@ DISTURBANCES: dict[str, dict[str, Any]] = {
 ABLATIONS: dict[str, dict[str, Any]] = {
     "both": {},
     "both, no slip trigger": {"slip_trigger": False},
-    "both, no reflex": {"reflex_press": 0.0},
+    "both, with reflex": {"reflex_press": 1.0},
     "replanning alone": {"feedback": False},
-    "feedback alone": {"replanning": False, "reflex_press": 0.0},
-    "feedback and reflex": {"replanning": False},
+    "feedback alone": {"replanning": False},
+    "feedback and reflex": {"replanning": False, "reflex_press": 1.0},
     "open loop": {"replanning": False, "feedback": False},
     "both, firm after trouble": {"grip": "firm after trouble"},
     "both, firm grip": {"grip": "firm"},
-    "feedback alone, firm grip": {"replanning": False, "reflex_press": 0.0, "grip": "firm"},
+    "both, firm grip with reflex": {"reflex_press": 1.0, "grip": "firm"},
+    "feedback alone, firm grip": {"replanning": False, "grip": "firm"},
 }
 
 

@@ -151,10 +151,11 @@ class ExecutorSettings:
 
     grip: Literal["usual", "firm after trouble", "firm"] = "usual"
     """When plans are sought with a firmer grip first: never; from the first slip, deviation, lost contact or missed goal on; always."""
-    reflex_press: float = 1.0
-    """Where a holding fingertip feels a sudden change, all fingers press harder by so many times the planned forces,"""
+    reflex_press: float = 0.0
+    """Where a holding fingertip feels a sudden change, all fingers press harder by so many times the planned forces: 1 where something pushes the
+    object, 0 where nothing does (docs/benchmarks/execute.md). This"""
     reflex_force: float = 1.5
-    """where its normal force changes by more than this beyond what is planned, in newtons, within 12 ms. By measurement: 0.8 N is felt now and
+    """is where its normal force changes by more than this beyond what is planned, in newtons, within 12 ms. By measurement: 0.8 N is felt now and
     then where nothing pushes, several newtons where 4 N push an object of 0.1 kg."""
     reflex_time: float = 0.4
     """for so long,"""
