@@ -128,7 +128,7 @@ def test_forces_that_make_up_for_spin_stay_in_the_cones_that_the_plan_counts_on(
         friction, _ = friction_of(rig)
         least = np.array([_least_of(rig, contacts, spin.moments, k) for k in range(len(contacts))])
         outside += bool((least > plan["promises"]["friction"] + 0.02).any())
-        # A hundredth of a newton of what is counted on, or less friction needed than by the least forces: some grasps have nothing better.
+        # At most 0.01 more friction than is counted on, or less than the least forces need: some grasps have nothing better.
         assert np.all((ratio.max(axis=1) < plan["promises"]["friction"] + 0.01) | (ratio.max(axis=1) < least)), seed
         assert np.all(ratio < friction), seed
     assert outside >= 2

@@ -152,15 +152,15 @@ class ExecutorSettings:
     grip: Literal["usual", "firm after trouble", "firm"] = "usual"
     """When plans are sought with a firmer grip first: never; from the first slip, deviation, lost contact or missed goal on; always."""
     reflex_press: float = 0.0
-    """Where a holding fingertip feels a sudden change, all fingers press harder by so many times the planned forces: 1 where something pushes the
-    object, 0 where nothing does (docs/benchmarks/execute.md). This"""
+    """Where a holding fingertip feels a sudden change, all fingers press harder by so many times the planned forces. 1 keeps more objects that
+    are pushed; where nothing pushes it does harm (docs/benchmarks/execute.md)."""
     reflex_force: float = 1.5
-    """is where its normal force changes by more than this beyond what is planned, in newtons, within 12 ms. By measurement: 0.8 N is felt now and
+    """A change is sudden where the normal force changes by more than this beyond what is planned, in newtons, within 12 ms. By measurement: 0.8 N is felt now and
     then where nothing pushes, several newtons where 4 N push an object of 0.1 kg."""
     reflex_time: float = 0.4
-    """for so long,"""
+    """The fingers press harder for so long after a sudden change,"""
     reflex_release: float = 0.3
-    """and then for so long less and less."""
+    """and then, for so long, less and less."""
     back_off_time: float = 0.3
     """Where there is no start, the hand goes back on its way for so long, and looks again."""
     gone_distance: float = 0.02

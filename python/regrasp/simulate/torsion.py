@@ -6,7 +6,8 @@ the spin is known from the plan, so the moment is too, and the fingers can balan
 Armstrong-Helouvry, Dupont, Canudas de Wit 1994, section 4).
 
 The moment of a contact follows the spin by Dahl's model: from rest it grows with the angle spun and saturates. It stays while
-nothing spins, and is zero at landing.
+nothing spins, and is zero at landing. What makes up for it stays within the friction that the plan counts on, by projections onto
+friction cones (Boyle, Dykstra 1986).
 """
 
 from __future__ import annotations
