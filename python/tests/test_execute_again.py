@@ -12,7 +12,7 @@ import regrasp
 
 pytest.importorskip("mujoco")
 
-from regrasp.execute import Executor, ExecutorSettings, MujocoPlant, PlantSettings, turns  # noqa: E402
+from regrasp.execute import Executor, ExecutorSessions, ExecutorSettings, MujocoPlant, PlantSettings, turns  # noqa: E402
 from regrasp.execute.estimate import PoseFilter  # noqa: E402
 from regrasp.execute.goals import between, towards  # noqa: E402
 from regrasp.execute.monitor import Monitor, Trigger  # noqa: E402
@@ -415,3 +415,28 @@ def test_where_a_leg_went_wrong_no_detour_is_made() -> None:
     assert [event.kind for event in log.events] == ["missed", "no_plan", "no_plan"]
     assert [angle_between(ticket.goal.quat_xyzw, goal.quat_xyzw) < 0.01 for ticket in Told.tickets] == [True] * 3
     assert log.status == "done" and log.n_reached == 0
+
+
+def test_the_hand_rests_while_a_plan_is_made_from_where_the_object_was_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Feedback goes on where a leg was planned ahead: that begins where the leg before ends."""
+    scene = regrasp.load_scene(SCENES / "box_90x.toml")
+    waits: list[tuple[bool, float]] = []
+    wait_for = Executor._wait_for
+
+    def watched(self: Executor, ticket: Ticket, *, rests: bool) -> None:
+        feedback = None if self._leg is None else self._leg.feedback
+        before = None if feedback is None else feedback.offsets.copy()
+        wait_for(self, ticket, rests=rests)
+        if feedback is not None:
+            assert not feedback.is_frozen
+            waits.append((rests, float(np.abs(feedback.offsets - before).max())))
+
+    monkeypatch.setattr(Executor, "_wait_for", watched)
+    for anytime in (False, True):
+        plant = MujocoPlant.of(scene, PlantSettings(seed=2), seed=2)
+        # Plans take half a second, and three where they are made ahead, longer than legs.
+        settings = ExecutorSettings(anytime=anytime, planning_overhead=3.0 if anytime else 0.5)
+        log = Executor.of(ExecutorSessions.of(scene), plant, settings).run(turns(plant.pose, count=3, seed=1, largest=0.6))
+        assert log.status == "done" and log.n_reached == 3
+    assert [moved for rests, moved in waits if rests] and all(moved == 0.0 for rests, moved in waits if rests)
+    assert any(moved > 0.0 for rests, moved in waits if not rests)

@@ -66,6 +66,45 @@ def test_forces_turn_with_the_object_as_far_as_it_is_turned_and_no_farther() -> 
         )
 
 
+def test_offsets_stay_as_they_are_while_they_are_frozen() -> None:
+    plan, xml = planned("box_90x", 1)
+    settings = Settings(controller="C2")
+    rig = make_rig(xml, plan, settings)
+    ref = reference(plan)
+    feedback = Controller(rig, ref, settings).feedback(rig, ref, settings)
+    qpos = rig.configurations[0].copy()
+    qpos[rig.object_qpos] += 0.002
+    sums = []
+    for is_frozen in (False, True, False):
+        feedback.is_frozen = is_frozen
+        commands = np.array([feedback.command(0, qpos) for _ in range(500)])
+        assert bool(np.ptp(commands, axis=0).max() == 0.0) == is_frozen
+        sums.append(float(np.linalg.norm(feedback.offsets)))
+    assert 0.0 < sums[0] == sums[1] < sums[2]
+
+
+def test_joints_stop_at_their_limits() -> None:
+    """Pushed with 0.7 N m by each motor, as 15 N on a fingertip do, from the inside of both limits."""
+    plan, xml = planned("sphere_90x", 0)
+    rig = make_rig(xml, plan, Settings(controller="C2"))
+    model = rig.model
+    # Fingers alone, without contacts and weight.
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_GRAVITY
+    model.actuator_gainprm[:, 0], model.actuator_biasprm[:] = 1.0, 0.0
+    joints = [model.joint(name).id for name in rig.joint_names]
+    low, high = model.jnt_range[joints].T
+    assert model.jnt_limited[joints].all()
+    for push, stops in ((0.7, high), (-0.7, low)):
+        data = mujoco.MjData(model)
+        data.qpos[:] = rig.configurations[0]
+        data.qpos[model.jnt_qposadr[joints]] = stops - 0.05 * np.sign(push)
+        data.ctrl[rig.motors] = push
+        for _ in range(1000):
+            mujoco.mj_step(model, data)
+        beyond = (data.qpos[model.jnt_qposadr[joints]] - stops) * np.sign(push)
+        assert np.all((-0.001 < beyond) & (beyond < 0.002)), beyond
+
+
 def test_fingers_that_press_harder_move_nothing_and_spare_their_motors() -> None:
     """What is added are forces without a sum or moments, as far as the motors have them: by projection onto the forces that have none."""
     plan, xml = planned("box_90x", 1)

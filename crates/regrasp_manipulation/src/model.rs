@@ -150,6 +150,9 @@ pub struct Model<'a> {
     pub may_release: bool,
     /// Settings.
     pub settings: PhysicsSettings,
+    /// Distances that pairs keep which began nearer than the clearance, by their index in `pairs`: the others have infinity there. Empty where
+    /// there are none.
+    pub kept: Vec<f64>,
 }
 
 impl<'a> Model<'a> {
@@ -308,6 +311,7 @@ impl<'a> Model<'a> {
             radii: bodies.iter().map(|body| body.radius).collect(),
             bodies,
             settings,
+            kept: Vec::new(),
         }
     }
 
@@ -389,6 +393,11 @@ impl<'a> Model<'a> {
             .map(|finger| self.grip(finger, &contacts[finger]))
             .collect();
         closure::closure_margin(&grips, &self.frame, enough)
+    }
+
+    /// Least distance that bodies keep which do not touch, in metres: the clearance, or less where a pair began nearer.
+    pub fn least_clearance(&self) -> f64 {
+        self.kept.iter().copied().fold(self.settings.clearance, f64::min)
     }
 
     /// Distance that the tip of a free finger keeps from the object: at least twice what the checker asks.

@@ -62,11 +62,11 @@ pub fn limits(model: &Model) -> MotionLimits {
     }
 }
 
-/// How far the motion may stray from the chords, in metres: the search keeps `clearance`, and leaves the contact tolerance
+/// How far the motion may stray from the chords, in metres: the search keeps the least clearance, and leaves the contact tolerance
 /// less the contact allowance.
 fn largest_stray(model: &Model) -> f64 {
     let settings = &model.settings;
-    STRAY_SHARE * settings.clearance.min(CONTACT_TOLERANCE - settings.contact_allowance).max(0.0)
+    STRAY_SHARE * model.least_clearance().min(CONTACT_TOLERANCE - settings.contact_allowance).max(0.0)
 }
 
 /// Gives every waypoint its time and its velocities. No step is passed faster than in `least_span` seconds.

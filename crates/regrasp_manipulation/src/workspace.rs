@@ -15,6 +15,8 @@ mod draws;
 mod nearby;
 /// How far tips may be from where they rest.
 mod reach;
+/// What is nearer at the start than the clearance.
+pub mod start;
 /// A fingertip in contact keeps to the surface.
 mod tip_clear;
 /// What is in the way of contacts.
@@ -396,7 +398,9 @@ impl<'a> Workspace<'a> {
         // Obstacles do not move, and are never first.
         let motion = self.motion[pair.a] + self.motion.get(pair.b).copied().unwrap_or(0.0);
         let is_free_tip = pair.tip_of.is_some_and(|finger| self.free & (1 << finger) != 0);
-        let required = if is_free_tip { self.model.free_clearance() } else { self.model.settings.clearance };
+        let usual = if is_free_tip { self.model.free_clearance() } else { self.model.settings.clearance };
+        let kept = self.model.kept.get(index).copied().unwrap_or(f64::INFINITY);
+        let required = usual.min(kept);
         self.slack[index] -= motion;
         if self.slack[index] > required {
             return true;
@@ -406,7 +410,7 @@ impl<'a> Workspace<'a> {
                 self.tip_is_clear(index, finger, Some(normal_in_world))
             }
             (Some(finger), TipMode::Away { finger: away, clearance }) if finger == away => {
-                self.apart(index, clearance, motion)
+                self.apart(index, clearance.min(kept), motion)
             }
             (Some(finger), _) if !is_free_tip => self.tip_is_clear(index, finger, None),
             _ => self.apart(index, required, motion),

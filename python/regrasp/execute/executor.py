@@ -204,11 +204,11 @@ class Executor(Steering):
         """The answer to where to go next: what was planned ahead, else a query from where the object is. Raises `GoOn` where the leg that
         was stopped is the best that there is."""
         ticket = prepared if prepared is not None else self._query(goal, is_again=is_again, has_missed=has_missed)
-        self._wait_for(ticket)
+        self._wait_for(ticket, rests=prepared is None)
         if prepared is not None and isinstance(ticket.answer, Plan) and self._is_off_start(ticket):
             # Too far from where the plan begins: it is made anew, from here.
             ticket = self._query(goal)
-            self._wait_for(ticket)
+            self._wait_for(ticket, rests=True)
         if not isinstance(ticket.answer, Plan) and self._may_go_on():
             raise GoOn("no_plan", _no_plan(ticket))
         return ticket
@@ -222,7 +222,7 @@ class Executor(Steering):
             return 0.0
         # The planner looks at where a plan ends only if the object moves.
         ticket = self._ask(start, towards(start.world_from_object, goal, REGRIP_TURN), first)
-        self._wait_for(ticket)
+        self._wait_for(ticket, rests=True)
         # Without a relocation the grasp holds well already.
         if not isinstance(ticket.answer, Plan) or ticket.answer.statistics["relocations"] == 0:
             return 0.0
@@ -240,7 +240,7 @@ class Executor(Steering):
             ticket = self._query(ways[turn - 1])
         except GoOn:
             return 0.0
-        self._wait_for(ticket)
+        self._wait_for(ticket, rests=True)
         return self._go_aside(ticket) if isinstance(ticket.answer, Plan) else 0.0
 
     def _go_aside(self, ticket: Ticket) -> float:
@@ -437,14 +437,21 @@ class Executor(Steering):
         share = speed if plan.statistics["relocations"] == 0 else 1.0
         return Leg(plan, self._rig, replace(self._control, speed=share * self._control.speed))
 
-    def _wait_for(self, ticket: Ticket) -> None:
-        """Holds until the answer is there."""
+    def _wait_for(self, ticket: Ticket, *, rests: bool) -> None:
+        """Holds until the answer is there. rests: the plan begins where the object was seen; feedback would bring it away from there, to
+        where the leg before has it, and press on and on where it cannot."""
+        feedback = None if self._leg is None else self._leg.feedback
         try:
+            if feedback is not None:
+                feedback.is_frozen = rests
             while not self._planning.is_ready(ticket, self._senses.time):
                 self._tick(moves=False, state="hold")
         except Withdrawn:
             ticket.cancelled.set()
             raise
+        finally:
+            if feedback is not None:
+                feedback.is_frozen = False
 
     def _is_off_start(self, ticket: Ticket) -> bool:
         """True where the object is not where a plan made ahead begins."""

@@ -107,6 +107,8 @@ class Feedback:
         self._gain = pressing * (settings.feedback_gain * settings.tick) - self._leak
         self._return = RETURN_SPEED * settings.tick
         self._offsets = np.zeros((len(rig.fingers), 3))
+        self.is_frozen = False
+        """Whether offsets stay as they are, wherever the object is: fingers rest."""
         self._turning: Array | None = None
         self._pressing_by: Array | None = None
         self._most_extra = np.zeros(0)
@@ -153,18 +155,18 @@ class Feedback:
         x, y, z = ref.object_position[k] - qpos[self._position]
         a, b, c = _turn(ref.object_quat_wxyz[k], qpos[self._quat])
         arms = self._arms[k]
-        lacking = np.empty_like(arms)
-        lacking[:, 0] = x + b * arms[:, 2] - c * arms[:, 1]
-        lacking[:, 1] = y + c * arms[:, 0] - a * arms[:, 2]
-        lacking[:, 2] = z + a * arms[:, 1] - b * arms[:, 0]
-        offsets = self._offsets
-        change = self._gain[k] * lacking - self._leak[k] * offsets
-        normals = self._normals[k]
-        # Where it is beyond the limit, because the finger landed so, it comes back without a jump.
-        limits = np.maximum(self._farthest_out[k], (offsets * normals).sum(axis=1) - self._return)
-        np.maximum(-LARGEST_OFFSET, np.minimum(LARGEST_OFFSET, offsets + change), out=offsets)
-        too_far = (offsets * normals).sum(axis=1) - limits
-        offsets -= np.maximum(too_far, 0.0)[:, None] * normals
+        offsets, normals = self._offsets, self._normals[k]
+        if not self.is_frozen:
+            lacking = np.empty_like(arms)
+            lacking[:, 0] = x + b * arms[:, 2] - c * arms[:, 1]
+            lacking[:, 1] = y + c * arms[:, 0] - a * arms[:, 2]
+            lacking[:, 2] = z + a * arms[:, 1] - b * arms[:, 0]
+            change = self._gain[k] * lacking - self._leak[k] * offsets
+            # Where it is beyond the limit, because the finger landed so, it comes back without a jump.
+            limits = np.maximum(self._farthest_out[k], (offsets * normals).sum(axis=1) - self._return)
+            np.maximum(-LARGEST_OFFSET, np.minimum(LARGEST_OFFSET, offsets + change), out=offsets)
+            too_far = (offsets * normals).sum(axis=1) - limits
+            offsets -= np.maximum(too_far, 0.0)[:, None] * normals
         shifted = offsets
         if self._give > 0.0:
             moved = self._jacobians[ref.waypoint[k]] @ (qpos[self._joint_qpos] - ref.joints[k])

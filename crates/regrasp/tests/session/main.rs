@@ -2,6 +2,8 @@
 
 /// Starts near edges.
 mod edges;
+/// Starts at which links are nearer to each other, or to the object, than plans keep them.
+mod near;
 
 use regrasp::base::{Budget, Rng};
 use regrasp::geometry::{Pose, Vector};
@@ -207,6 +209,16 @@ fn what_is_no_start_is_refused_with_its_cause() {
     joints[0] = f64::NAN;
     assert!(refused(&Observation { joints, ..seen.clone() }).contains("NaN"));
     assert!(refused(&Observation { joints: vec![0.0; 3], ..seen.clone() }).contains("has 3 joints"));
+    // Pushed past its stop.
+    let finger = &session.view().hand.fingers[0];
+    let mut joints = seen.joints.clone();
+    joints[1] = finger.chain.upper[1] + 0.05;
+    let message = refused(&Observation { joints, ..seen.clone() });
+    let name = &session.view().hand.joint_names()[1];
+    assert!(
+        message.contains(&format!("joint \"{name}\"")) && message.contains("0.0500 beyond its limits"),
+        "{message}"
+    );
     // Two fingers opened wide: the other two do not hold a box.
     let rest: Vec<f64> = session.view().hand.fingers.iter().flat_map(|finger| finger.rest.iter().copied()).collect();
     let mut joints = seen.joints.clone();

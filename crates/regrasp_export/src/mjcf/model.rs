@@ -74,7 +74,7 @@ fn write_settings(xml: &mut Xml, gravity: [f64; 3]) {
     xml.open("default", &[]);
     // What touches what is said by pairs alone.
     xml.leaf("geom", &[("contype", "0".into()), ("conaffinity", "0".into())]);
-    xml.leaf("joint", &[("armature", "0.0002".into()), ("damping", "0.005".into())]);
+    xml.leaf("joint", &[&[("armature", "0.0002".into()), ("damping", "0.005".into())], &hard_stops()[..]].concat());
     xml.leaf("pair", &[("solref", "0.005 1".into()), ("solimp", "0.95 0.99 0.0005".into())]);
     xml.open("default", &[("class", "unplanned".into())]);
     xml.leaf("pair", &[("condim", "3".into())]);
@@ -84,6 +84,12 @@ fn write_settings(xml: &mut Xml, gravity: [f64; 3]) {
     xml.leaf("joint", &[("armature", "0.02".into()), ("damping", "0.5".into())]);
     xml.close();
     xml.close();
+}
+
+/// How joints stop at their limits. With MuJoCo's own values a finger's light links give: one that pressed on an object with 15 N was 0.1 rad
+/// beyond its stop. With these the same force moves it by less than a milliradian.
+pub fn hard_stops() -> [(&'static str, String); 2] {
+    [("solreflimit", "0.004 1".into()), ("solimplimit", "0.99 0.999 0.0001".into())]
 }
 
 impl<'a> MjcfModel<'a> {

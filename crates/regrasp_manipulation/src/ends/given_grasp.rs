@@ -37,11 +37,10 @@ pub fn given_grasp_at(
 ) -> Result<Option<GraspState>, Failure> {
     let state = match request {
         GraspRequest::Automatic => return Ok(None),
-        GraspRequest::Joints(values) => from_joints(model, end, world_from_object, values, |_| true)?,
-        GraspRequest::Posture { joints, holds } => {
-            from_joints(model, end, world_from_object, joints, |finger| holds.get(finger).copied().unwrap_or(true))?
-        }
         GraspRequest::Contacts(points) => from_contacts(model, end, world_from_object, points, near)?,
+        GraspRequest::Joints(_) | GraspRequest::Posture { .. } => {
+            posture_at(model, end, world_from_object, request)?.expect("joints are given")
+        }
     };
     refuse_out_of_reach(model, end, &state.joints)?;
     let mut workspace = Workspace::new(model);
@@ -55,6 +54,23 @@ pub fn given_grasp_at(
             "choose other contacts or joints",
         ));
     }
+    Ok(Some(state))
+}
+
+/// The grasp of given joints, whatever they are in the way of; None where the query gives no joints.
+pub fn posture_at(
+    model: &Model,
+    end: End,
+    world_from_object: &Pose,
+    request: &GraspRequest,
+) -> Result<Option<GraspState>, Failure> {
+    let state = match request {
+        GraspRequest::Automatic | GraspRequest::Contacts(_) => return Ok(None),
+        GraspRequest::Joints(values) => from_joints(model, end, world_from_object, values, |_| true)?,
+        GraspRequest::Posture { joints, holds } => {
+            from_joints(model, end, world_from_object, joints, |finger| holds.get(finger).copied().unwrap_or(true))?
+        }
+    };
     Ok(Some(state))
 }
 

@@ -115,6 +115,7 @@ const PRESSING_REACH: f64 = 2.0;
 /// Errors: numbers that make no sense, or no start within `limits`, and why.
 pub fn project(model: &Model, observed: &Observed, limits: &ProjectionLimits) -> Result<Projection, Failure> {
     let posture = posture_of(model, observed)?;
+    refuse_beyond_limits(model, observed, &posture, limits)?;
     let object = Placement::from(&posture.object);
     let gaps: Vec<Option<f64>> =
         (0..model.n_fingers()).map(|f| gap_of(model, f, &posture.joints[f], &object)).collect();
@@ -200,6 +201,26 @@ fn posture_of(model: &Model, observed: &Observed) -> Result<Posture, Failure> {
         }
     });
     Ok(Posture { object: *pose, joints: joints.collect() })
+}
+
+/// Refuses joints that are farther beyond their limits than a start may move them: what the fingers would touch there is another question.
+fn refuse_beyond_limits(
+    model: &Model,
+    observed: &Observed,
+    posture: &Posture,
+    limits: &ProjectionLimits,
+) -> Result<(), Failure> {
+    let within = posture.joints.iter().flatten();
+    let beyond = observed.joints.iter().zip(within).zip(model.view.hand.joint_names());
+    for ((&seen, &within), name) in beyond.filter(|((seen, within), _)| !((*seen - *within).abs() <= limits.turn)) {
+        let by = (seen - within).abs();
+        let message = format!(
+            "joint \"{name}\" is at {seen:.4}, {by:.4} beyond its limits; a start moves joints by {} at most",
+            limits.turn
+        );
+        return Err(refusal(message, "ease the finger off its stop, or correct the limits of the joint in the URDF"));
+    }
+    Ok(())
 }
 
 /// The start in which the fingers of `holding` hold, if there is one near `posture`.

@@ -30,7 +30,8 @@ pub struct PhysicsSettings {
     /// Longest step of the object or a fingertip between waypoints, in metres. Origin: measurements on a prototype, 2 to
     /// 3 mm.
     pub step: f64,
-    /// Smallest distance between bodies that must not touch, in metres. By hand.
+    /// Smallest distance between bodies that must not touch, in metres. Those that are nearer at a given start may stay so near, by half of
+    /// their distance there or more, and 0.02 mm at least. By hand.
     pub clearance: f64,
     /// How much farther contacts keep from edges than the object's `edge_distance`, in metres: fingertips never land quite where they
     /// should. Contacts of a given start that are nearer may only roll away from the edge. Without effect where `edge_distance` is 0.

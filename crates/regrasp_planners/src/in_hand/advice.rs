@@ -55,7 +55,7 @@ pub fn advise(
     let limits = Budget { max_work: work, deadline, ..budget.clone() };
     let mut solves = |view: &HandView, query: &InHandQuery| {
         let changed = Asked { view, query, progress: &|_| {}, ..*asked };
-        plan_with(&changed, &short, &limits, work).is_ok()
+        plan_with(&changed, &short, &limits, work, false).is_ok()
     };
     if let Some(told) = first_that_helps(asked, failure, &mut solves) {
         failure.advice =

@@ -48,10 +48,12 @@ use recording::record;
 use refusals::{given_grasp, refuse_after_transfers, refuse_hopeless};
 use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_manipulation::ends::end::End;
+use regrasp_manipulation::ends::given_grasp::posture_at;
 use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::grasp::sequence::Sequence;
 use regrasp_manipulation::in_world::{failure_in_world, plan_in_world};
 use regrasp_manipulation::model::Model;
+use regrasp_manipulation::workspace::start::distances_to_keep;
 use regrasp_plan::Plan;
 use regrasp_plan::plan::Statistics;
 use regrasp_scene::{GraspRequest, HandView, InHandQuery};
@@ -110,7 +112,7 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
     let search_work = settings.search.search_work.map_or(budget.max_work, |most| most.min(budget.max_work));
     for (first, work) in first_try::first_tries(asked.view, settings, search_work, gives_start) {
         let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
-        match plan_with(asked, &first, &left, work) {
+        match plan_with(asked, &first, &left, work, true) {
             Ok(mut plan) => {
                 plan.statistics.work += spent;
                 return Ok(Plan { settings: record::settings_of(settings), ..plan });
@@ -123,7 +125,7 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
         }
     }
     let left = Budget { max_work: budget.max_work.saturating_sub(spent), ..budget.clone() };
-    let mut found = plan_with(asked, settings, &left, search_work.saturating_sub(spent));
+    let mut found = plan_with(asked, settings, &left, search_work.saturating_sub(spent), false);
     let (Ok(Plan { statistics, .. }) | Err(Failure { statistics, .. })) = &mut found;
     statistics.work += spent;
     if let Err(failure) = &mut found {
@@ -140,15 +142,25 @@ fn plan_in_hand_frame(asked: &Asked, settings: &InHandSettings, budget: &Budget)
 }
 
 /// As [`plan_in_hand`], with the clearance and closure margin of the settings. `first_work` is the work of the first plan; what
-/// improves it has the `whole` budget.
-fn plan_with(asked: &Asked, settings: &InHandSettings, whole: &Budget, first_work: u64) -> Result<Plan, Failure> {
+/// improves it has the `whole` budget. Bodies that are nearer to each other at a given start than the clearance may stay so near, but
+/// for first tries, which are made to keep farther away.
+fn plan_with(
+    asked: &Asked,
+    settings: &InHandSettings,
+    whole: &Budget,
+    first_work: u64,
+    is_first_try: bool,
+) -> Result<Plan, Failure> {
     let Asked { view, query, seed, progress } = *asked;
     let budget = &Budget { max_work: first_work.min(whole.max_work), ..whole.clone() };
     let settings = &effective(settings).within(&view.limits);
-    let model = Model::new(view, &settings.physics);
+    let mut model = Model::new(view, &settings.physics);
     refuse_hopeless(&model, settings, query)?;
     let poses = query.poses();
     let (start_pose, goal_pose) = (query.world_from_object_start, query.world_from_object_goal);
+    if !is_first_try && let Some(start) = posture_at(&model, End::Start, &start_pose, &query.start_grasp)? {
+        model.kept = distances_to_keep(&model, &start);
+    }
     let mut rng = Rng::keyed(seed, "given_grasps", 0);
     let start_grasp = given_grasp(&model, End::Start, &start_pose, &query.start_grasp, &mut rng)?;
     let goal_grasp = given_grasp(&model, End::Goal, &goal_pose, &query.goal_grasp, &mut rng)?;

@@ -14,6 +14,7 @@ mod free;
 use super::Mjcf;
 use super::geom::{Geom, Look, Weight, is_hollowed, open_body, write_geom, write_inertial, write_mesh};
 use super::inertia::{self, Inertial};
+use super::model::hard_stops;
 use super::solid::ObjectSolid;
 use super::tip::own_tip;
 use super::xml::{Xml, numbers};
@@ -215,6 +216,7 @@ impl RobotModel<'_> {
         // written one by one.
         let [around, links, base] = if self.free.is_some() { ["5", "6", "4"] } else { ["1", "2", "0"] };
         xml.leaf("geom", &[("contype", "2".into()), ("conaffinity", around.into())]);
+        xml.leaf("joint", &hard_stops());
         for (class, meets, met_by) in [("robot", "1", links), ("base", "0", base), ("tip", "1", "2")] {
             xml.open("default", &[("class", class.into())]);
             xml.leaf("geom", &[("contype", meets.into()), ("conaffinity", met_by.into())]);

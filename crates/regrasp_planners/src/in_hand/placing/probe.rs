@@ -78,7 +78,7 @@ pub fn probe(
         let seen = view.hand_from_world().map(|hand_from_world| query.seen_from(&hand_from_world));
         let asked = Asked { view, query: seen.as_ref().unwrap_or(&query), seed, progress: &silent };
         let limits = Budget { max_work: work, ..budget.clone() };
-        probes.push(match plan_with(&asked, &short, &limits, work) {
+        probes.push(match plan_with(&asked, &short, &limits, work, false) {
             Ok(plan) => Probe {
                 work: plan.statistics.work,
                 n_solved: 1,

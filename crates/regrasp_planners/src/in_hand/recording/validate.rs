@@ -10,6 +10,7 @@ use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::in_world::plan_in_hand_frame;
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::recording::waypoint::{contact_of, joints_of};
+use regrasp_manipulation::workspace::start::distances_to_keep;
 use regrasp_manipulation::workspace::{TipMode, Workspace};
 use regrasp_plan::plan::{Plan, Segment, SegmentKind, Waypoint};
 use regrasp_robot::kinematics::finger_ik::Coordinates;
@@ -40,7 +41,10 @@ impl std::error::Error for NotProven {}
 /// Errors: the first step that is not proven.
 pub fn validate_once(view: &HandView, plan: &Plan, settings: &InHandSettings) -> Result<(), NotProven> {
     let plan = &plan_in_hand_frame(view, plan);
-    let model = Model::new(view, &settings.physics);
+    let mut model = Model::new(view, &settings.physics);
+    if let Some(start) = plan.segments.first().and_then(|segment| segment.waypoints.first()) {
+        model.kept = distances_to_keep(&model, &state_at(&model, start));
+    }
     let mut workspace = Workspace::new(&model);
     for (index, segment) in plan.segments.iter().enumerate() {
         validate_segment(&model, &mut workspace, segment).map_err(|(waypoint, cause)| NotProven {
@@ -52,15 +56,16 @@ pub fn validate_once(view: &HandView, plan: &Plan, settings: &InHandSettings) ->
     Ok(())
 }
 
+fn state_at(model: &Model, waypoint: &Waypoint) -> GraspState {
+    let pose = Pose::from(&waypoint.world_from_object);
+    GraspState::of(pose, waypoint.contacts.iter().map(contact_of).zip(joints_of(model, waypoint)))
+}
+
 /// Errors: index of the waypoint and what is wrong with the step to it.
 fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment) -> Result<(), (usize, String)> {
     let waypoints = segment.waypoints.as_slice();
     let ends = waypoints.first().zip(waypoints.last());
-    let state_at = |waypoint: &Waypoint| {
-        let pose = Pose::from(&waypoint.world_from_object);
-        GraspState::of(pose, waypoint.contacts.iter().map(contact_of).zip(joints_of(model, waypoint)))
-    };
-    let Some((start, end)) = ends.map(|(first, last)| (state_at(first), state_at(last))) else {
+    let Some((start, end)) = ends.map(|(first, last)| (state_at(model, first), state_at(model, last))) else {
         return Err((0, "the segment has no waypoints".into()));
     };
     let moving = segment.moving_finger.as_ref().and_then(|name| model.view.hand.finger_named(name)).map(|id| id.0);
@@ -74,7 +79,7 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
     match (segment.kind, moving) {
         (SegmentKind::Transfer, _) => {
             for (k, waypoint) in waypoints.iter().enumerate().skip(1) {
-                let here = state_at(waypoint);
+                let here = state_at(model, waypoint);
                 if waypoint.contacts != waypoints[k - 1].contacts {
                     let margin = model.closure_margin(&here.contacts, here.holding);
                     if margin < model.settings.closure_margin {
@@ -83,7 +88,7 @@ fn validate_segment(model: &Model, workspace: &mut Workspace, segment: &Segment)
                     workspace.roll_to(&here.contacts);
                 }
                 if !workspace.step(&here.world_from_object, &here.joints, TipMode::AllHold)
-                    && !is_clear_backwards(workspace, &here, &state_at(&waypoints[k - 1]))
+                    && !is_clear_backwards(workspace, &here, &state_at(model, &waypoints[k - 1]))
                 {
                     return Err((k, in_the_way(workspace)));
                 }
