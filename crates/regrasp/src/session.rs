@@ -10,13 +10,15 @@ use regrasp_base::{Budget, Diagnostic, InputError, Place};
 use regrasp_geometry::Pose;
 use regrasp_grasp::record::PoseData;
 use regrasp_plan::Plan;
-use regrasp_plan::check::{CheckSettings, OwnQuery, Report, check, query_of};
+use regrasp_plan::check::measured::MeasuredTips;
+use regrasp_plan::check::{CheckSettings, OwnQuery, Report, check_with_tips, query_of};
 use regrasp_plan::plan::Asked;
 use regrasp_planners::in_hand::roadmap::{GraspRoadmap, QueryMemory, RoadmapPlanner};
 use regrasp_planners::in_hand::starting::{self, Observation, ProjectionLimits, Start};
 use regrasp_planners::{Failure, FailureKind, InHandSettings, Progress, plan_in_hand};
 use regrasp_scene::{GraspRequest, HandView, InHandQuery, LoadedScene, Query, Task};
 use std::path::Path;
+use std::sync::Arc;
 
 pub use regrasp_planners::in_hand::starting::{Moved, ObservedVelocities, Touching};
 
@@ -29,6 +31,7 @@ pub struct Session<'a> {
     view: HandView<'a>,
     settings: InHandSettings,
     roadmap: Option<&'a SessionRoadmap>,
+    tips: Arc<MeasuredTips>,
 }
 
 /// A roadmap that agrees with a session in hand, object, friction, obstacles, fingertips, and in the settings that decide what is
@@ -60,7 +63,14 @@ impl<'a> Session<'a> {
             return Err(bad("A510", "task", problem).expected("a task of kind \"in_hand\"").into());
         }
         settings.validate().map_err(|problem| bad("A503", "settings", problem))?;
-        Ok(Session { loaded, task, view: HandView::of(&loaded.manipulation_of(task)), settings, roadmap: None })
+        Ok(Session {
+            loaded,
+            task,
+            view: HandView::of(&loaded.manipulation_of(task)),
+            settings,
+            roadmap: None,
+            tips: Arc::default(),
+        })
     }
 
     /// A roadmap, which came from `path`, as this session may ask it.
@@ -77,6 +87,12 @@ impl<'a> Session<'a> {
     #[must_use]
     pub fn with_roadmap(self, roadmap: &'a SessionRoadmap) -> Self {
         Session { roadmap: Some(roadmap), ..self }
+    }
+
+    /// The same session, which measures no fingertip that `tips` knows, and adds to them: for sessions that share a scene.
+    #[must_use]
+    pub fn with_tips(self, tips: &Arc<MeasuredTips>) -> Self {
+        Session { tips: tips.clone(), ..self }
     }
 
     /// The hand and the object.
@@ -180,13 +196,13 @@ impl<'a> Session<'a> {
     pub fn check(&self, plan: &Plan, settings: &CheckSettings) -> Report {
         let query = query_of(&self.loaded.scene, self.task, plan);
         let settings = CheckSettings { own_query: OwnQuery::Allowed, ..settings.clone() };
-        check((&self.loaded.scene, &self.loaded.state), Some(&query), plan, &settings)
+        check_with_tips(&self.tips, (&self.loaded.scene, &self.loaded.state), Some(&query), plan, &settings)
     }
 
     /// Judges a plan against what was asked from `start` to `goal`, whatever the plan says.
     pub fn check_asked(&self, plan: &Plan, start: &Start, goal: &Pose, settings: &CheckSettings) -> Report {
         let query = Query::InHand(self.query(start, goal));
         let settings = CheckSettings { own_query: OwnQuery::Allowed, ..settings.clone() };
-        check((&self.loaded.scene, &self.loaded.state), Some(&query), plan, &settings)
+        check_with_tips(&self.tips, (&self.loaded.scene, &self.loaded.state), Some(&query), plan, &settings)
     }
 }

@@ -100,8 +100,8 @@ pub struct Session {
 
 impl Session {
     fn opened(&self) -> Result<regrasp::Session<'_>, regrasp::InputError> {
-        let loaded = &self.scene.get().loaded;
-        let session = regrasp::Session::open(loaded, self.task.as_deref(), self.settings.clone())?;
+        let Scene { loaded, tips, .. } = self.scene.get();
+        let session = regrasp::Session::open(loaded, self.task.as_deref(), self.settings.clone())?.with_tips(tips);
         Ok(match &self.roadmap {
             Some(roadmap) => session.with_roadmap(roadmap),
             None => session,

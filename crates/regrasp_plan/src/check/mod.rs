@@ -49,6 +49,8 @@ pub mod level;
 pub mod lift;
 /// What is too large to be judged.
 pub mod limits;
+/// Fingertips measured once for many plans.
+pub mod measured;
 /// The scene as the checker sees it.
 pub mod model;
 /// One step between two waypoints, and certificates of separation.
@@ -109,6 +111,7 @@ pub use violation::{Moment, Violation, ViolationKind};
 use crate::format::AnyPlan;
 use crate::plan::Plan;
 use crate::robot_plan::RobotPlan;
+use measured::MeasuredTips;
 use model::CheckedHand;
 use regrasp_geometry::Pose;
 use regrasp_scene::pick_and_place::PICK_AND_PLACE;
@@ -355,7 +358,18 @@ impl Log {
 ///
 /// `scene` must be loaded afresh from the files: the hashes in `scene.inputs` are compared with those of the plan.
 /// All that the plan does not move rests in `state`.
-pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Plan, settings: &CheckSettings) -> Report {
+pub fn check(around: (&Scene, &State), query: Option<&Query>, plan: &Plan, settings: &CheckSettings) -> Report {
+    check_with_tips(&MeasuredTips::default(), around, query, plan, settings)
+}
+
+/// The same, for many plans: what was measured of fingertips is kept in `tips`.
+pub fn check_with_tips(
+    tips: &MeasuredTips,
+    (scene, state): (&Scene, &State),
+    query: Option<&Query>,
+    plan: &Plan,
+    settings: &CheckSettings,
+) -> Report {
     let work = limits::Work::of(settings);
     let mut log = Log { most_per_kind: settings.most_per_kind, work, ..Log::default() };
     let mut report = Report::default();
@@ -367,7 +381,7 @@ pub fn check((scene, state): (&Scene, &State), query: Option<&Query>, plan: &Pla
     let query = started.as_ref().or(query);
     let wrong_scene = |message| Violation::new(ViolationKind::WrongScene, message);
     let found = holders::manipulation(scene, state, query, plan)
-        .and_then(|task| Ok((task, CheckedHand::new(&task).map_err(wrong_scene)?)));
+        .and_then(|task| Ok((task, CheckedHand::with_tips(&task, tips).map_err(wrong_scene)?)));
     match found {
         Err(violation) => log.push(violation),
         Ok((task, model)) => {

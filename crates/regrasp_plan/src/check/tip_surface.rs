@@ -22,7 +22,7 @@ pub enum TipSurface {
         hull: Option<Arc<ConvexHull>>,
     },
     /// A smooth surface near a hull.
-    Smooth(Box<Smooth>),
+    Smooth(Arc<Smooth>),
 }
 
 /// A smooth surface near a hull, in the frame of the last moving body. With the points `v_i`, the exponent `p` and the rounding
@@ -82,6 +82,14 @@ impl Smooth {
             }
         }
         smooth
+    }
+
+    /// True where this is the surface of these points about that very hull; over which pad it was measured is not said.
+    pub fn is_of(&self, surface: &SmoothHull, hull: &Arc<ConvexHull>) -> bool {
+        let numbers = |exponent: f64, rounding: f64| [exponent, rounding];
+        Arc::ptr_eq(&self.hull, hull)
+            && numbers(self.exponent, self.rounding) == numbers(f64::from(surface.exponent()), surface.rounding())
+            && self.points == surface.points()
     }
 
     /// The point with the outward normal `n`, a unit vector, from the centre.
@@ -164,7 +172,7 @@ impl TipSurface {
                 ellipsoid(fitted, Some(hull.clone()))
             }
             TipShape::Hull { hull, surface: HullSurface::Smooth(surface), .. } => {
-                TipSurface::Smooth(Box::new(Smooth::of(surface, hull, tip.pad.as_ref())))
+                TipSurface::Smooth(Arc::new(Smooth::of(surface, hull, tip.pad.as_ref())))
             }
         }
     }

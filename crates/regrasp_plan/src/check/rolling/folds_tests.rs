@@ -18,7 +18,7 @@ fn finger() -> FingerModel {
         path: Path { joints: Vec::new(), last_from_link: Matrix4::identity() },
         center: Point::origin(),
         radius: 0.02,
-        surface: TipSurface::Smooth(Box::new(tip)),
+        surface: TipSurface::Smooth(Arc::new(tip)),
         pad: None,
         contact: ContactModel::Point,
         tip_link: LinkId(0),
