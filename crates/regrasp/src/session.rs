@@ -10,8 +10,8 @@ use regrasp_base::{Budget, Diagnostic, InputError, Place};
 use regrasp_geometry::Pose;
 use regrasp_grasp::record::PoseData;
 use regrasp_plan::Plan;
-use regrasp_plan::check::measured::MeasuredTips;
-use regrasp_plan::check::{CheckSettings, OwnQuery, Report, check_with_tips, query_of};
+use regrasp_plan::check::prepared::Prepared;
+use regrasp_plan::check::{CheckSettings, OwnQuery, Report, check_prepared, query_of};
 use regrasp_plan::plan::Asked;
 use regrasp_planners::in_hand::roadmap::{GraspRoadmap, QueryMemory, RoadmapPlanner};
 use regrasp_planners::in_hand::starting::{self, Observation, ProjectionLimits, Start};
@@ -31,7 +31,7 @@ pub struct Session<'a> {
     view: HandView<'a>,
     settings: InHandSettings,
     roadmap: Option<&'a SessionRoadmap>,
-    tips: Arc<MeasuredTips>,
+    prepared: Arc<Prepared>,
 }
 
 /// A roadmap that agrees with a session in hand, object, friction, obstacles, fingertips, and in the settings that decide what is
@@ -69,7 +69,7 @@ impl<'a> Session<'a> {
             view: HandView::of(&loaded.manipulation_of(task)),
             settings,
             roadmap: None,
-            tips: Arc::default(),
+            prepared: Arc::default(),
         })
     }
 
@@ -89,10 +89,11 @@ impl<'a> Session<'a> {
         Session { roadmap: Some(roadmap), ..self }
     }
 
-    /// The same session, which measures no fingertip that `tips` knows, and adds to them: for sessions that share a scene.
+    /// The same session, whose checker prepares no shape and no fingertip that is in `prepared`, and adds to it: for sessions that share a
+    /// scene.
     #[must_use]
-    pub fn with_tips(self, tips: &Arc<MeasuredTips>) -> Self {
-        Session { tips: tips.clone(), ..self }
+    pub fn sharing(self, prepared: &Arc<Prepared>) -> Self {
+        Session { prepared: prepared.clone(), ..self }
     }
 
     /// The hand and the object.
@@ -196,13 +197,13 @@ impl<'a> Session<'a> {
     pub fn check(&self, plan: &Plan, settings: &CheckSettings) -> Report {
         let query = query_of(&self.loaded.scene, self.task, plan);
         let settings = CheckSettings { own_query: OwnQuery::Allowed, ..settings.clone() };
-        check_with_tips(&self.tips, (&self.loaded.scene, &self.loaded.state), Some(&query), plan, &settings)
+        check_prepared(&self.prepared, (&self.loaded.scene, &self.loaded.state), Some(&query), plan, &settings)
     }
 
     /// Judges a plan against what was asked from `start` to `goal`, whatever the plan says.
     pub fn check_asked(&self, plan: &Plan, start: &Start, goal: &Pose, settings: &CheckSettings) -> Report {
         let query = Query::InHand(self.query(start, goal));
         let settings = CheckSettings { own_query: OwnQuery::Allowed, ..settings.clone() };
-        check_with_tips(&self.tips, (&self.loaded.scene, &self.loaded.state), Some(&query), plan, &settings)
+        check_prepared(&self.prepared, (&self.loaded.scene, &self.loaded.state), Some(&query), plan, &settings)
     }
 }

@@ -8,7 +8,7 @@ use pyo3::types::PyBytes;
 use regrasp::base::files;
 use regrasp::base::{Diagnostic, Place, Rng};
 use regrasp::geometry::Pose;
-use regrasp::plan::check::measured::MeasuredTips;
+use regrasp::plan::check::prepared::Prepared;
 use regrasp::robot::import::{KeptFiles, LoadOptions, ResolveOptions, load_hand};
 use regrasp::robot::inspect::{InspectSettings, hand_file_text, inspect_hand};
 use regrasp::scene::{Gravity, InputFile, LoadedScene, Stock, Task, load_scene_with};
@@ -28,8 +28,8 @@ pub fn load_options((packages, search_paths, lenient): Options) -> LoadOptions {
 pub struct Scene {
     /// What was read.
     pub loaded: LoadedScene,
-    /// What the checker has measured of its fingertips.
-    pub tips: Arc<MeasuredTips>,
+    /// What the checker has prepared of it.
+    pub prepared: Arc<Prepared>,
     source: Source,
 }
 
@@ -81,7 +81,7 @@ fn read(source: &Source, stock: &Stock) -> Result<LoadedScene, regrasp::InputErr
 impl Scene {
     fn of(py: Python<'_>, source: Source) -> PyResult<Self> {
         let loaded = py.detach(|| read(&source, &source.stock)).map_err(|error| error::input(py, &error))?;
-        Ok(Scene { loaded, tips: Arc::default(), source })
+        Ok(Scene { loaded, prepared: Arc::default(), source })
     }
 
     /// The same scene, read afresh: the checker starts from files. Of a scene without a file the text is read again; hands and

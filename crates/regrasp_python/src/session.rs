@@ -100,8 +100,8 @@ pub struct Session {
 
 impl Session {
     fn opened(&self) -> Result<regrasp::Session<'_>, regrasp::InputError> {
-        let Scene { loaded, tips, .. } = self.scene.get();
-        let session = regrasp::Session::open(loaded, self.task.as_deref(), self.settings.clone())?.with_tips(tips);
+        let Scene { loaded, prepared, .. } = self.scene.get();
+        let session = regrasp::Session::open(loaded, self.task.as_deref(), self.settings.clone())?.sharing(prepared);
         Ok(match &self.roadmap {
             Some(roadmap) => session.with_roadmap(roadmap),
             None => session,

@@ -3,12 +3,14 @@
 use crate::check::carried::{is_of_hand, joints_above_base, links_of_no_hand};
 use crate::check::kinematics::{Path, pose_of};
 use crate::check::model::CheckedHand;
+use crate::check::prepared::Prepared;
 use nalgebra::{Rotation3, UnitQuaternion};
 use regrasp_geometry::reference::ReferenceShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_robot::LinkId;
 use regrasp_robot::hand::convex_of;
 use regrasp_scene::Manipulation;
+use std::sync::Arc;
 
 /// What carries an item.
 #[derive(Debug, Clone)]
@@ -62,7 +64,7 @@ pub struct Item {
     /// True for that hull.
     is_hull: bool,
     /// The shape.
-    pub shape: ReferenceShape,
+    pub shape: Arc<ReferenceShape>,
     /// Pose of the shape in the carrier's frame.
     pub carrier_from_shape: Pose,
     /// Centre of a ball that contains the shape, in the carrier's frame.
@@ -92,6 +94,7 @@ pub struct Bodies {
     pub items: Vec<Item>,
     /// Pairs to judge.
     pub pairs: Vec<Pair>,
+    prepared: Arc<Prepared>,
 }
 
 /// Index of the object in [`Bodies::carriers`].
@@ -101,8 +104,17 @@ const WORLD: usize = 1;
 impl Bodies {
     /// Reads all shapes of `scene`. Err with a message when a shape cannot be used for queries.
     pub fn new(task: &Manipulation, model: &CheckedHand) -> Result<Self, String> {
-        let mut bodies =
-            Bodies { carriers: vec![Carrier::Object, Carrier::World], items: Vec::new(), pairs: Vec::new() };
+        Self::with(task, model, &Arc::default())
+    }
+
+    /// The same, with shapes that may be prepared already.
+    pub fn with(task: &Manipulation, model: &CheckedHand, prepared: &Arc<Prepared>) -> Result<Self, String> {
+        let mut bodies = Bodies {
+            carriers: vec![Carrier::Object, Carrier::World],
+            items: Vec::new(),
+            pairs: Vec::new(),
+            prepared: prepared.clone(),
+        };
         bodies.add_hand(task, model)?;
         let object = task.object();
         bodies.add(&object.name, Owner::Object, OBJECT, &Pose::identity(), &object.shape)?;
@@ -130,7 +142,7 @@ impl Bodies {
         shape: &Shape,
     ) -> Result<&mut Item, String> {
         let (center, radius) = shape.bounding_sphere();
-        let reference = ReferenceShape::new(shape).map_err(|error| format!("\"{name}\": {error}"))?;
+        let reference = self.prepared.shape(shape).map_err(|error| format!("\"{name}\": {error}"))?;
         self.items.push(Item {
             name: name.to_owned(),
             owner,

@@ -49,8 +49,6 @@ pub mod level;
 pub mod lift;
 /// What is too large to be judged.
 pub mod limits;
-/// Fingertips measured once for many plans.
-pub mod measured;
 /// The scene as the checker sees it.
 pub mod model;
 /// One step between two waypoints, and certificates of separation.
@@ -63,6 +61,8 @@ mod pieces;
 mod polygon;
 /// How far apart poses are, and what lies between.
 pub mod pose;
+/// Shapes and fingertips prepared once for many plans.
+pub mod prepared;
 /// What the plan promises, and whether the promises may be made and are kept.
 pub mod promises;
 /// Plans of whole robots.
@@ -111,13 +111,14 @@ pub use violation::{Moment, Violation, ViolationKind};
 use crate::format::AnyPlan;
 use crate::plan::Plan;
 use crate::robot_plan::RobotPlan;
-use measured::MeasuredTips;
 use model::CheckedHand;
+use prepared::Prepared;
 use regrasp_geometry::Pose;
 use regrasp_scene::pick_and_place::PICK_AND_PLACE;
 use regrasp_scene::{Manipulation, Query, Scene, State};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// How strict the checker is.
@@ -359,12 +360,12 @@ impl Log {
 /// `scene` must be loaded afresh from the files: the hashes in `scene.inputs` are compared with those of the plan.
 /// All that the plan does not move rests in `state`.
 pub fn check(around: (&Scene, &State), query: Option<&Query>, plan: &Plan, settings: &CheckSettings) -> Report {
-    check_with_tips(&MeasuredTips::default(), around, query, plan, settings)
+    check_prepared(&Arc::default(), around, query, plan, settings)
 }
 
-/// The same, for many plans: what was measured of fingertips is kept in `tips`.
-pub fn check_with_tips(
-    tips: &MeasuredTips,
+/// The same, for many plans: shapes and fingertips that `prepared` has are not prepared again.
+pub fn check_prepared(
+    prepared: &Arc<Prepared>,
     (scene, state): (&Scene, &State),
     query: Option<&Query>,
     plan: &Plan,
@@ -381,7 +382,7 @@ pub fn check_with_tips(
     let query = started.as_ref().or(query);
     let wrong_scene = |message| Violation::new(ViolationKind::WrongScene, message);
     let found = holders::manipulation(scene, state, query, plan)
-        .and_then(|task| Ok((task, CheckedHand::with_tips(&task, tips).map_err(wrong_scene)?)));
+        .and_then(|task| Ok((task, CheckedHand::with(&task, prepared).map_err(wrong_scene)?)));
     match found {
         Err(violation) => log.push(violation),
         Ok((task, model)) => {
@@ -394,7 +395,7 @@ pub fn check_with_tips(
                 );
                 log.push(wrong_scene(message).subjects([follower]));
             } else if form_is_sound(&model, plan, &mut log) {
-                judge(&task, query, plan, settings, &model, &mut log, &mut report);
+                judge((&task, prepared), query, plan, settings, &model, &mut log, &mut report);
             }
         }
     }
@@ -453,7 +454,7 @@ fn form_is_sound(model: &CheckedHand, plan: &Plan, log: &mut Log) -> bool {
 }
 
 fn judge(
-    task: &Manipulation,
+    (task, prepared): (&Manipulation, &Arc<Prepared>),
     query: Option<&Query>,
     plan: &Plan,
     settings: &CheckSettings,
@@ -491,7 +492,7 @@ fn judge(
         report.max_half_way_imbalance = Some(balance.half_way);
         report.max_sliding_force_error = balance.sliding;
     }
-    match bodies::Bodies::new(task, model) {
+    match bodies::Bodies::with(task, model, prepared) {
         Err(message) => log.push(Violation::new(ViolationKind::WrongScene, message)),
         _ if leap.is_some() => {
             report.left_out.extend(leap.map(|leap| format!("motion between waypoints: {leap}")));

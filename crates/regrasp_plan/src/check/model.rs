@@ -2,7 +2,7 @@
 
 use crate::check::carried::world_from_base;
 use crate::check::kinematics::{Drive, Path, world_from_root};
-use crate::check::measured::MeasuredTips;
+use crate::check::prepared::Prepared;
 use crate::check::surface::SortedShape;
 use crate::check::tip_surface::TipSurface;
 use nalgebra::Matrix4;
@@ -63,11 +63,11 @@ impl DriveRow {
 impl FingerModel {
     /// A finger of a robot whose root stands at a pose and whose joint vector has these names.
     ///
-    /// `coordinates`: the finger's own place in the joint vector; `at_rest`: the joint vector at rest. Tips are measured where `tips` does
-    /// not know them. Err with a message when the robot contradicts itself.
+    /// `coordinates`: the finger's own place in the joint vector; `at_rest`: the joint vector at rest. Tips are measured where `prepared`
+    /// does not know them. Err with a message when the robot contradicts itself.
     pub fn new(
         robot: &Robot,
-        (finger, tips): (&Finger, &MeasuredTips),
+        (finger, prepared): (&Finger, &Prepared),
         (world_from_root, joint_names): (&Pose, &[String]),
         coordinates: std::ops::Range<usize>,
         at_rest: &[f64],
@@ -83,7 +83,7 @@ impl FingerModel {
             body_from_tip_link,
             center,
             radius: finger.tip.radius(),
-            surface: tips.surface(&finger.tip),
+            surface: prepared.surface(&finger.tip),
             pad: finger.tip.pad,
             contact: finger.tip.contact,
             tip_link: finger.tip.link,
@@ -158,11 +158,11 @@ pub struct CheckedHand {
 impl CheckedHand {
     /// Reads the hand of `scene`. Err with a message when the hand contradicts itself.
     pub fn new(task: &Manipulation) -> Result<Self, String> {
-        Self::with_tips(task, &MeasuredTips::default())
+        Self::with(task, &Prepared::default())
     }
 
     /// The same, with fingertips that may be measured already.
-    pub fn with_tips(task: &Manipulation, tips: &MeasuredTips) -> Result<Self, String> {
+    pub fn with(task: &Manipulation, prepared: &Prepared) -> Result<Self, String> {
         let hand = task.hand();
         let robot = &hand.robot;
         let joint_names = hand.joint_names();
@@ -175,7 +175,7 @@ impl CheckedHand {
             first = coordinates.end;
             fingers.push(FingerModel::new(
                 robot,
-                (finger, tips),
+                (finger, prepared),
                 (&world_from_root, &joint_names),
                 coordinates,
                 &at_rest,

@@ -1,7 +1,7 @@
 //! What a plan of pick and place is about: robot, hands, object, gravity.
 
-use crate::check::measured::MeasuredTips;
 use crate::check::model::FingerModel;
+use crate::check::prepared::Prepared;
 use crate::check::robots::question::Question;
 use crate::check::violation::{Violation, ViolationKind as Kind};
 use crate::robot_plan::{HoldingPromises, RobotPlan};
@@ -108,7 +108,7 @@ fn hands_of(scene: &Scene, question: &Question) -> Result<Vec<TaskHand>, String>
     let robot: &Manipulator = question.robot;
     let names = &question.joint_names;
     let at_rest = robot.layout.rest();
-    let tips = MeasuredTips::default();
+    let prepared = Prepared::default();
     let mut hands = Vec::new();
     for placed in &scene.hands {
         let Some(carrier) = placed.carrier.filter(|carrier| carrier.robot == question.index) else { continue };
@@ -120,7 +120,7 @@ fn hands_of(scene: &Scene, question: &Question) -> Result<Vec<TaskHand>, String>
             let own = first..first + finger.chain.n_coordinates();
             first = own.end;
             let root = (robot.world_from_root(), names.as_slice());
-            fingers.push(FingerModel::new(&robot.robot, (finger, &tips), root, own, &at_rest)?);
+            fingers.push(FingerModel::new(&robot.robot, (finger, &prepared), root, own, &at_rest)?);
         }
         let body = question.tree.link(hand.base).0;
         let above = coordinates_above(question, hand.base);
