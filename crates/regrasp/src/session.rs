@@ -1,7 +1,8 @@
 //! A session: many queries of one scene, which is read once. A robot asks it again and again where to go from where it really is.
 //!
 //! [`Session::project`] makes a start of what was observed, [`Session::plan`] plans from it, [`Session::check`] judges the plan.
-//! Nothing is read meanwhile, and nothing is kept from one query to the next: the same query has the same answer.
+//! Nothing is read meanwhile, and nothing is kept from one query to the next but what the checker has prepared of the scene's shapes: the
+//! same query has the same answer.
 //!
 //! A session may have a roadmap: it is asked first ([`Session::with_roadmap`]), and a search where it has no answer that the checker
 //! accepts.

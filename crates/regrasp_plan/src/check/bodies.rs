@@ -8,7 +8,6 @@ use nalgebra::{Rotation3, UnitQuaternion};
 use regrasp_geometry::reference::ReferenceShape;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_robot::LinkId;
-use regrasp_robot::hand::convex_of;
 use regrasp_scene::Manipulation;
 use std::sync::Arc;
 
@@ -185,7 +184,8 @@ impl Bodies {
             self.carriers.push(Carrier::Link(path));
             let carrier = self.carriers.len() - 1;
             for (element, placed) in link.collision.iter().enumerate() {
-                let shape = convex_of(&placed.shape).map_err(|error| format!("link \"{}\": {error}", link.name))?;
+                let shape =
+                    self.prepared.convex(&placed.shape).map_err(|error| format!("link \"{}\": {error}", link.name))?;
                 let item = self.add(&link.name, owner, carrier, &placed.parent_from_shape, &shape)?;
                 let is_tip = tip_of.is_some_and(|finger| finger.tip_has(element));
                 (item.link, item.body_depth, item.is_tip) = (Some(LinkId(l)), body_depth, is_tip);
@@ -228,7 +228,8 @@ impl Bodies {
                 let world_from_link = pose_of(&path.world_from_link(joints));
                 let name = format!("{}/{}", other.name, link.name);
                 for placed in &link.collision {
-                    let shape = convex_of(&placed.shape).map_err(|error| format!("link \"{name}\": {error}"))?;
+                    let shape =
+                        self.prepared.convex(&placed.shape).map_err(|error| format!("link \"{name}\": {error}"))?;
                     self.add(&name, Owner::Resting, WORLD, &(world_from_link * placed.parent_from_shape), &shape)?;
                 }
             }
@@ -257,7 +258,7 @@ impl Bodies {
             let link = &robot.robot.links[id.0];
             let name = format!("{}/{}", robot.name, link.name);
             for placed in &link.collision {
-                let shape = convex_of(&placed.shape).map_err(|error| format!("link \"{name}\": {error}"))?;
+                let shape = self.prepared.convex(&placed.shape).map_err(|error| format!("link \"{name}\": {error}"))?;
                 // The arm that carries the hand is where it was built to be: the palm is not kept away from it.
                 let owner = if carries { Owner::Obstacle } else { Owner::Resting };
                 let at = world_from_link * placed.parent_from_shape;

@@ -2,9 +2,11 @@
 //! the rest of a check less.
 
 use crate::check::tip_surface::{Smooth, TipSurface};
-use regrasp_geometry::Shape;
+use regrasp_geometry::hull::HullError;
 use regrasp_geometry::reference::ReferenceShape;
+use regrasp_geometry::{Shape, TriangleMesh};
 use regrasp_robot::TipShape;
+use regrasp_robot::hand::convex_of;
 use regrasp_robot::tip::{HullSurface, Pad, Tip};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -14,7 +16,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub struct Prepared {
     tips: Mutex<Vec<(Option<Pad>, Arc<Smooth>)>>,
     shapes: Mutex<Vec<(Shape, Arc<ReferenceShape>)>>,
+    hulls: Mutex<Vec<(Arc<TriangleMesh>, Shape)>>,
 }
+
+/// Most hulls, meshes and fingertips that are kept, of each: far more than scenes have.
+const MOST: usize = 2000;
 
 impl std::fmt::Debug for Prepared {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -34,8 +40,24 @@ impl Prepared {
             return TipSurface::Smooth(found.clone());
         }
         let measured = Arc::new(Smooth::of(smooth, hull, tip.pad.as_ref()));
-        known.push((tip.pad, measured.clone()));
+        if known.len() < MOST {
+            known.push((tip.pad, measured.clone()));
+        }
         TipSurface::Smooth(measured)
+    }
+
+    /// The convex shape that stands for `shape` in a hand: as [`convex_of`].
+    pub fn convex(&self, shape: &Shape) -> Result<Shape, HullError> {
+        let Shape::Mesh(mesh) = shape else { return convex_of(shape) };
+        let mut known = self.hulls.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, found)) = known.iter().find(|(known, _)| Arc::ptr_eq(known, mesh)) {
+            return Ok(found.clone());
+        }
+        let hull = convex_of(shape)?;
+        if known.len() < MOST {
+            known.push((mesh.clone(), hull.clone()));
+        }
+        Ok(hull)
     }
 
     /// `shape`, ready to be asked for distances. Err with a message when it cannot be used for queries.
@@ -51,7 +73,7 @@ impl Prepared {
         }
         let prepared = Arc::new(ReferenceShape::new(shape).map_err(|error| error.to_string())?);
         // Others take no time.
-        if matches!(shape, Shape::Convex(_) | Shape::Mesh(_)) {
+        if matches!(shape, Shape::Convex(_) | Shape::Mesh(_)) && known.len() < MOST {
             known.push((shape.clone(), prepared.clone()));
         }
         Ok(prepared)
@@ -95,6 +117,22 @@ mod tests {
             assert_eq!(Arc::ptr_eq(&of(shape), &first[k]), k < 3);
             assert!(first[..k].iter().all(|other| !Arc::ptr_eq(other, &first[k])), "{k}");
         }
+    }
+
+    #[test]
+    fn hulls_of_meshes_are_made_once() {
+        let corners = [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]].map(Point::from);
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let mesh = || Shape::Mesh(TriangleMesh::new(corners.to_vec(), faces.to_vec()).unwrap().into());
+        let (one, other) = (mesh(), mesh());
+        let prepared = Prepared::default();
+        let of = |shape: &Shape| match prepared.convex(shape).unwrap() {
+            Shape::Convex(hull) => hull,
+            other => panic!("{other:?}"),
+        };
+        let hulls = [of(&one), of(&other), of(&one)];
+        assert!(Arc::ptr_eq(&hulls[0], &hulls[2]) && !Arc::ptr_eq(&hulls[0], &hulls[1]));
+        assert_eq!(Shape::Convex(hulls[0].clone()), convex_of(&one).unwrap());
     }
 
     #[test]
