@@ -59,6 +59,5 @@ fn what_is_near_at_the_start_may_stay_near_and_nothing_else() {
             assert!(nearest.distance >= least - 1e-6, "{k}: {names:?} {} of {pair:?} {distance}", nearest.distance);
         }
     }
-    println!("{n_near} {n_found}");
     assert!(n_near >= 5 && n_found >= 3, "{n_near} {n_found}");
 }

@@ -211,16 +211,17 @@ fn refuse_beyond_limits(
     limits: &ProjectionLimits,
 ) -> Result<(), Failure> {
     let within = posture.joints.iter().flatten();
-    let beyond = observed.joints.iter().zip(within).zip(model.view.hand.joint_names());
-    for ((&seen, &within), name) in beyond.filter(|((seen, within), _)| !((*seen - *within).abs() <= limits.turn)) {
-        let by = (seen - within).abs();
-        let message = format!(
-            "joint \"{name}\" is at {seen:.4}, {by:.4} beyond its limits; a start moves joints by {} at most",
-            limits.turn
-        );
-        return Err(refusal(message, "ease the finger off its stop, or correct the limits of the joint in the URDF"));
-    }
-    Ok(())
+    let mut seen = observed.joints.iter().zip(within).zip(model.view.hand.joint_names());
+    let Some(((seen, within), name)) = seen.find(|((seen, within), _)| !((*seen - *within).abs() <= limits.turn))
+    else {
+        return Ok(());
+    };
+    let by = (seen - within).abs();
+    let message = format!(
+        "joint \"{name}\" is at {seen:.4}, {by:.4} beyond its limits; a start moves joints by {} at most",
+        limits.turn
+    );
+    Err(refusal(message, "ease the finger off its stop, or correct the limits of the joint in the URDF"))
 }
 
 /// The start in which the fingers of `holding` hold, if there is one near `posture`.
