@@ -42,7 +42,9 @@ impl std::error::Error for NotProven {}
 pub fn validate_once(view: &HandView, plan: &Plan, settings: &InHandSettings) -> Result<(), NotProven> {
     let plan = &plan_in_hand_frame(view, plan);
     let mut model = Model::new(view, &settings.physics);
-    if let Some(start) = plan.segments.first().and_then(|segment| segment.waypoints.first()) {
+    // A start that the planner chose keeps the clearance; one that was observed keeps what it has.
+    let is_observed = plan.asked.is_some();
+    if let Some(start) = plan.segments.first().and_then(|segment| segment.waypoints.first()).filter(|_| is_observed) {
         model.kept = distances_to_keep(&model, &state_at(&model, start));
     }
     let mut workspace = Workspace::new(&model);
