@@ -17,7 +17,7 @@ from regrasp.execute.estimate import PoseFilter  # noqa: E402
 from regrasp.execute.goals import between, towards  # noqa: E402
 from regrasp.execute.monitor import Monitor, Trigger  # noqa: E402
 from regrasp.execute.planning import ChargedPlanning, Ticket  # noqa: E402
-from regrasp.execute.settings import PLANNER, careful_settings  # noqa: E402
+from regrasp.execute.settings import NEAR, PLANNER, careful_settings  # noqa: E402
 from regrasp.simulate.reference import quat_exp, quat_product  # noqa: E402
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -109,6 +109,20 @@ class Strict:
             return answer
         elsewhere = regrasp.Pose(np.array([0.0, 0.0, 9.0]), np.array([0.0, 0.0, 0.0, 1.0]))
         return self._session.project(elsewhere, *args[1:], distance=distance, turn=turn, **more)
+
+
+def test_sessions_for_near_starts_are_asked_last_and_for_no_plans(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = regrasp.load_scene(SCENES / "sphere_90x.toml")
+    plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
+    # The usual session refuses every start, so all are those of the other.
+    strict: Any = Strict(regrasp.Session(scene, settings=PLANNER), 1.0)
+    near: Any = Strict(regrasp.Session(scene, settings=NEAR), 0.0)
+    monkeypatch.setattr(near, "plan", lambda *args, **more: pytest.fail("a plan was asked for"), raising=False)
+    settings = ExecutorSettings(anytime=False)
+    log = Executor(strict, plant, settings, near=[near]).run(turns(plant.pose, count=2, seed=3))
+    assert log.status == "done" and log.n_reached == 2, log.message
+    assert len(strict.asked) == len(near.asked) >= 2
+    assert all(plan.settings["clearance"] == 0.0002 for plan in log.plans)
 
 
 @pytest.mark.parametrize(("least", "status"), [(0.0035, "done"), (0.007, "done"), (0.0085, "gave_up")])

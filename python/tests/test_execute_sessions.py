@@ -24,6 +24,7 @@ from regrasp.execute.settings import (
     FIRMER,
     LOOSE,
     LOOSE_EDGED,
+    NEAR,
     MESH_TIPS,
     PLANNER,
     ExecutorSettings,
@@ -92,7 +93,7 @@ def test_sessions_of_a_scene_have_the_settings_of_execution(
     plan = regrasp.plan(scene, seed=1)
     assert isinstance(plan, regrasp.Plan)
     assert len(sessions.careful) == len(careful)
-    others = [(sessions.usual, usual), (sessions.loose, loose), (sessions.firm, FIRM), (sessions.anew, ANEW)]
+    others = [(sessions.usual, usual), (sessions.loose, loose), (sessions.near, NEAR), (sessions.firm, FIRM), (sessions.anew, ANEW)]
     for session, least in [*zip(sessions.careful, careful), *others]:
         start = session.project(regrasp.Pose(plan.object_positions[-1], plan.object_quat_xyzw[-1]), plan.joints[-1])
         assert start

@@ -83,6 +83,23 @@ def test_offsets_stay_as_they_are_while_they_are_frozen() -> None:
     assert 0.0 < sums[0] == sums[1] < sums[2]
 
 
+@pytest.mark.parametrize("largest", [0.004, 0.01])
+def test_offsets_end_at_the_largest(largest: float) -> None:
+    """An object that is held where it should not be: feedback pushes no farther, and comes back."""
+    plan, xml = planned("box_90x", 1)
+    settings = Settings(controller="C2", largest_offset=largest)
+    rig = make_rig(xml, plan, settings)
+    ref = reference(plan)
+    feedback = Controller(rig, ref, settings).feedback(rig, ref, settings)
+    qpos = rig.configurations[0].copy()
+    there = qpos[rig.object_qpos : rig.object_qpos + 3].copy()
+    for shift, n_ticks in ((-0.02, 2000), (0.001, 1)):
+        qpos[rig.object_qpos : rig.object_qpos + 3] = there + shift
+        for _ in range(n_ticks):
+            feedback.command(0, qpos)
+        assert (np.abs(feedback.offsets).max() == pytest.approx(largest, rel=1e-12)) == (shift < 0.0)
+
+
 def test_joints_stop_at_their_limits() -> None:
     """Pushed with 0.7 N m by each motor, as 15 N on a fingertip do, from the inside of both limits."""
     plan, xml = planned("sphere_90x", 0)

@@ -47,6 +47,7 @@ class Executor(Steering):
         planning: Callable[[Sequence[Session], ExecutorSettings, Prepare], Planning] | None = None,
         careful: Sequence[Session] = (),
         loose: Sequence[Session] = (),
+        near: Sequence[Session] = (),
         firm: Sequence[Session] = (),
         anew: Sequence[Session] = (),
         stiffness: Array | None = None,
@@ -57,7 +58,7 @@ class Executor(Steering):
 
         planning: ``ThreadPlanning`` for robots; where nothing is said, ``ChargedPlanning`` for plants that know the truth, which are
         simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first; loose: that are asked
-        last, and for starts that the session refuses; firm: that are asked before all others where ``grip`` says so; anew: of plans that
+        last, and for starts that the session refuses; near: for starts that those refuse too, and for no plans; firm: that are asked before all others where ``grip`` says so; anew: of plans that
         end in grasps that hold well, asked where no plan leads on. stiffness, damping: of the robot's joints, where they are not those of
         replays.
         listener: is told every event, and what became of every goal, as it happens, on the thread that runs.
@@ -72,11 +73,12 @@ class Executor(Steering):
             speed=base.speed,
             torsion_told=base.torsion_told,
             feedback_gain=base.feedback_gain,
+            largest_offset=self._settings.largest_offset,
             hold_time=0.0,
         )
         maker = planning or (ChargedPlanning if self._truth is not None else ThreadPlanning)
         self._planning = maker([*careful, session, *loose], self._settings, self._prepare)
-        self._for_starts = [session, *loose]
+        self._for_starts = [session, *loose, *near]
         self._is_round = session.object.shape.kind in ROUND
         self._firm = firm
         self._anew = anew
@@ -93,7 +95,8 @@ class Executor(Steering):
     @classmethod
     def of(cls, sessions: ExecutorSessions, plant: Plant, settings: ExecutorSettings | None = None, **more: Any) -> Executor:
         """With all sessions of a scene. more: as of `Executor`."""
-        all_of_it: dict[str, Any] = {"careful": sessions.careful, "loose": [sessions.loose], "firm": [sessions.firm], "anew": [sessions.anew], **more}
+        others = {"loose": [sessions.loose], "near": [sessions.near], "firm": [sessions.firm], "anew": [sessions.anew]}
+        all_of_it: dict[str, Any] = {"careful": sessions.careful, **others, **more}
         return cls(sessions.usual, plant, settings, **all_of_it)
 
     # ------------------------------------------------------------------------------------------------------------- whole runs

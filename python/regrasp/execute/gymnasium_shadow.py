@@ -22,7 +22,7 @@ from .executor import Executor
 from .foreign_plant import ForeignPlant, ForeignSettings
 from .goals import turns
 from .sessions import ExecutorSessions
-from .settings import CAREFUL, LOOSE, ExecutorSettings
+from .settings import CAREFUL, LOOSE, NEAR, ExecutorSettings
 
 MODEL = "envs/assets/hand/manipulate_block.xml"
 #: A tendon with 0.001 m of play couples the last two joints of four fingers. Under load it rests at one end; in radians of the last joint.
@@ -108,6 +108,7 @@ def main(arguments: list[str] | None = None) -> int:
         plant,
         SETTINGS,
         loose=[sessions.loose, Session(crept, settings=LOOSE)],
+        near=[sessions.near, Session(crept, settings=NEAR)],
         stiffness=plant.stiffness,
         damping=plant.damping,
     )

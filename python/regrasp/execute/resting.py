@@ -25,7 +25,7 @@ from ..simulate.controllers import Controller
 from ..simulate.model import Settings, make_rig
 from ..simulate.plans import flat
 from ..simulate.reference import reference
-from .settings import LOOSE
+from .settings import NEAR
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -41,7 +41,7 @@ def main(arguments: list[str] | None = None) -> int:
     all_states = all_starts = 0
     for path in asked.scenes:
         scene = load_scene(path, packages=packages)
-        session = Session(scene, settings=LOOSE)
+        session = Session(scene, settings=NEAR)
         n_states, n_starts, n_late = 0, 0, 0
         times: list[float] = []
         moved: list[tuple[float, float, float]] = []

@@ -8,7 +8,7 @@ from typing import Any
 
 from .._model import Scene
 from .._session import Session
-from .settings import ANEW, FIRM, careful_settings, loose_settings, usual_settings, work_share
+from .settings import ANEW, FIRM, NEAR, careful_settings, loose_settings, usual_settings, work_share
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,8 @@ class ExecutorSessions:
     """Those of `careful_settings`."""
     loose: Session
     """For starts that are worse than plans may be."""
+    near: Session
+    """For starts with links nearer to the object. It makes no plans."""
     firm: Session
     """A firmer grip."""
     anew: Session
@@ -35,7 +37,7 @@ class ExecutorSessions:
             return Session(scene, settings=planner_settings(kind, work_share(hand)))
 
         careful = tuple(opened(kind) for kind in careful_settings(moved))
-        return cls(opened(usual_settings(moved)), careful, opened(loose_settings(moved)), opened(FIRM), opened(ANEW))
+        return cls(opened(usual_settings(moved)), careful, opened(loose_settings(moved)), opened(NEAR), opened(FIRM), opened(ANEW))
 
 
 def planner_settings(settings: Mapping[str, Any], share: float) -> dict[str, Any]:

@@ -37,10 +37,13 @@ CAREFUL_ROUND: dict[str, Any] = {**FIRMER, "friction_margin": 2.0, "end_margin":
 #: a little off, that link presses in place of the tip, and no start is found any more. The wide hand's links stand back 1 mm behind their
 #: fingertips: in two runs with much trouble (friction 0.7) 8 of 80 legs had no plan with 0.6 mm.
 CLEAR_ROUND: dict[str, Any] = {**CAREFUL_ROUND, "clearance": 0.0006}
-#: ``PLANNER`` for starts that are worse than plans may be: links may be nearer to what they must not touch, grasps may hold less.
-LOOSE: dict[str, Any] = {**PLANNER, "clearance": 2e-5, "closure_margin": 0.001}
+#: ``PLANNER`` for starts that are worse than plans may be: grasps may hold less.
+LOOSE: dict[str, Any] = {**PLANNER, "closure_margin": 0.001}
 #: The same with the grip of ``FIRMER``, for objects with edges.
 LOOSE_EDGED: dict[str, Any] = {**LOOSE, "forces": FIRMER["forces"]}
+#: ``LOOSE`` for starts at which links are nearer to the object than plans keep them. Nothing is planned with this: planners let what is near
+#: at a start stay so, and a plan with this clearance brought another link within 0.1 mm of a cube, where it pressed in place of the fingertip.
+NEAR: dict[str, Any] = {**LOOSE, "clearance": 2e-5}
 #: ``PLANNER`` with more room for friction and a firmer grip: legs are planned with these first where ``grip`` says so. Origin: pushes of 4 N on the bundled box.
 FIRM: dict[str, Any] = {**PLANNER, "friction_margin": 2.0, "forces": {"squeeze": 12.0, "normal_force": [2.0, 30.0]}}
 #: ``FIRMER`` with a better grasp at the end: so the hand takes hold of the object anew, where no plan leads on from the present grasp.
@@ -81,6 +84,9 @@ class ExecutorSettings:
 
     feedback: bool = True
     """Controller ``C2``, which feeds the object's pose back; else ``B``."""
+    largest_offset: float = 0.004
+    """Feedback moves the target of a fingertip by so much at most, along each axis of the world. In legs that went well (wide hand, Allegro, LEAP)
+    it was 2.7 mm at most. Where a link is in the way, no offset brings the object to where it should be, and larger ones push it out."""
     replanning: bool = True
     """Observes after every leg, and replans where a leg goes wrong. Else legs follow each other as planned, whatever happens."""
     slip_trigger: bool = True

@@ -11,8 +11,6 @@ from .model import Rig, Settings, angular_jacobians, contact_jacobians, forces_i
 from .reference import Array, Reference, held_at_waypoints, rotation_matrices, waypoints_of
 from .torsion import Spinning, least_forces, spinning
 
-#: Largest offset of a fingertip by feedback, in metres.
-LARGEST_OFFSET = 0.01
 #: Speed at which a tip that landed with an offset away from the object comes back to where it presses as planned, in metres per second.
 RETURN_SPEED = 0.005
 #: Controller H: share of a tip's stiffness along the normal that is taken away. A tip that slides, or stands where the object
@@ -106,6 +104,7 @@ class Feedback:
         self._leak = (1.0 - pressing) * (settings.tick / FREE_FOLLOW_TIME)
         self._gain = pressing * (settings.feedback_gain * settings.tick) - self._leak
         self._return = RETURN_SPEED * settings.tick
+        self._largest_offset = settings.largest_offset
         self._offsets = np.zeros((len(rig.fingers), 3))
         self.is_frozen = False
         """Whether offsets stay as they are, wherever the object is: fingers rest."""
@@ -164,7 +163,7 @@ class Feedback:
             change = self._gain[k] * lacking - self._leak[k] * offsets
             # Where it is beyond the limit, because the finger landed so, it comes back without a jump.
             limits = np.maximum(self._farthest_out[k], (offsets * normals).sum(axis=1) - self._return)
-            np.maximum(-LARGEST_OFFSET, np.minimum(LARGEST_OFFSET, offsets + change), out=offsets)
+            np.maximum(-self._largest_offset, np.minimum(self._largest_offset, offsets + change), out=offsets)
             too_far = (offsets * normals).sum(axis=1) - limits
             offsets -= np.maximum(too_far, 0.0)[:, None] * normals
         shifted = offsets

@@ -23,6 +23,9 @@ CONTROLLERS = ("A", "B", "C2", "H")
 #: Damping of inverse Jacobians, in metres per radian.
 INVERSE_DAMPING = 0.005
 
+#: Largest offset of a fingertip's target by feedback, along each axis, in metres.
+LARGEST_OFFSET = 0.01
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -55,6 +58,8 @@ class Settings:
     """How far controller A pushes its targets into the object, in metres."""
     feedback_gain: float = 2.0
     """Of C2, per second."""
+    largest_offset: float = LARGEST_OFFSET
+    """Of C2: how far from its plan feedback moves the target of a fingertip along each axis of the world at most, in metres."""
     forces_turn: bool = True
     """Of C2: forces turn with the object where it is turned from its plan. Else they keep their directions in the world."""
     stiffness_scale: float = 1.0

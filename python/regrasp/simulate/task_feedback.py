@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ._mujoco import MjData, mujoco
-from .controllers import FREE_FOLLOW_TIME, LARGEST_OFFSET, RETURN_SPEED
-from .model import INVERSE_DAMPING
+from .controllers import FREE_FOLLOW_TIME, RETURN_SPEED
+from .model import INVERSE_DAMPING, LARGEST_OFFSET
 from .reference import Array, rotation_matrices
 from .task_reference import TaskReference, TaskRig
 

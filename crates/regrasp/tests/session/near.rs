@@ -6,6 +6,7 @@ use regrasp::base::Budget;
 use regrasp::plan::check::CheckSettings;
 use regrasp::plan::check::along::{Along, along};
 use regrasp::plan::plan::{Plan, Waypoint};
+use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::starting::ProjectionLimits;
 use regrasp::scene::LoadedScene;
 use regrasp::session::Session;
@@ -13,9 +14,9 @@ use regrasp::session::Session;
 /// Clearance asked for, in metres.
 const ASKED: f64 = 0.0008;
 
-fn careful(loaded: &LoadedScene) -> Session<'_> {
+fn careful(loaded: &LoadedScene, clearance: f64) -> Session<'_> {
     let mut settings = InHandSettings::default();
-    settings.physics.clearance = ASKED;
+    settings.physics.clearance = clearance;
     Session::open(loaded, None, settings).unwrap()
 }
 
@@ -41,7 +42,7 @@ fn near_ones(loaded: &LoadedScene) -> Vec<(Waypoint, f64, [String; 2])> {
 #[test]
 fn what_is_near_at_the_start_may_stay_near_and_nothing_else() {
     let loaded = loaded("box_90x.toml");
-    let (observing, session) = (crate::session(&loaded), careful(&loaded));
+    let (observing, session) = (crate::session(&loaded), careful(&loaded, ASKED));
     let (mut n_near, mut n_found) = (0, 0);
     for (k, (waypoint, distance, pair)) in near_ones(&loaded).into_iter().enumerate() {
         n_near += 1;
@@ -60,4 +61,27 @@ fn what_is_near_at_the_start_may_stay_near_and_nothing_else() {
         }
     }
     assert!(n_near >= 5 && n_found >= 3, "{n_near} {n_found}");
+}
+
+/// However much clearance is asked for, a start is refused only for what is nearer than the least distance, 0.02 mm.
+#[test]
+fn a_start_is_as_good_with_more_clearance() {
+    let loaded = loaded("box_90x.toml");
+    let observing = crate::session(&loaded);
+    let mut n_near = 0;
+    for (waypoint, distance, _) in near_ones(&loaded) {
+        // Below the smallest share of the larger clearance.
+        if distance > 0.0003 {
+            continue;
+        }
+        n_near += 1;
+        let start = observing.project(&observation(&waypoint), &ProjectionLimits::default()).unwrap();
+        for clearance in [0.0004, 0.01] {
+            let session = careful(&loaded, clearance);
+            let found = session.plan(&start, &turned(&start, 0.02), 0, &Budget::work(300), &|_| {});
+            let refused = found.err().filter(|failure| failure.kind == FailureKind::StartInvalid);
+            assert!(refused.is_none(), "{clearance} {distance}: {}", refused.unwrap());
+        }
+    }
+    assert!(n_near >= 3, "{n_near}");
 }

@@ -6,7 +6,7 @@ use super::{TipMode, Workspace};
 use crate::grasp::state::GraspState;
 use crate::model::Model;
 
-/// A pair keeps the first of these shares of the clearance that it has at the start: at least half of its distance.
+/// A pair keeps the first of these shares of the clearance that it has at the start, about half of its distance or more, or else the least distance.
 const SHARES: [f64; 6] = [0.8, 0.5, 0.3, 0.15, 0.08, 0.04];
 /// Least distance that is kept, in metres, and of the tip of a free finger from the object. By hand: below it plans have no room to stray
 /// from what was tested. Of free fingertips the checker asks for half of that.
@@ -30,7 +30,8 @@ pub fn distances_to_keep(model: &Model, start: &GraspState) -> Vec<f64> {
             Some(_) => (model.free_clearance(), LEAST_OF_TIPS),
             None => (model.settings.clearance, LEAST),
         };
-        let mut distances = SHARES.iter().map(|share| share * usual).filter(|distance| *distance >= least);
+        let shares = SHARES.iter().map(|share| share * usual).filter(|distance| *distance >= least);
+        let mut distances = shares.chain([least]);
         if let Some(distance) = distances.find(|distance| workspace.apart(index, *distance, 0.0)) {
             kept.resize(model.pairs.len(), f64::INFINITY);
             kept[index] = distance;
