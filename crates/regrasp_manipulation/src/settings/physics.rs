@@ -31,7 +31,7 @@ pub struct PhysicsSettings {
     /// 3 mm.
     pub step: f64,
     /// Smallest distance between bodies that must not touch, in metres. Those that are nearer at a given start may stay so near, by half of
-    /// their distance there or more, and 0.02 mm at least. By hand.
+    /// their distance there or more, and 0.02 mm at least (0.1 mm for the tip of a free finger). By hand.
     pub clearance: f64,
     /// How much farther contacts keep from edges than the object's `edge_distance`, in metres: fingertips never land quite where they
     /// should. Contacts of a given start that are nearer may only roll away from the edge. Without effect where `edge_distance` is 0.
