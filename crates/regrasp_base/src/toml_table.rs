@@ -14,6 +14,21 @@ const QUOTE_LIMIT: usize = 60;
 /// Faults of the syntax that are told one by one: one fault mostly draws others after it.
 const MAX_SYNTAX_FAULTS: usize = 5;
 
+/// For who gives a URDF where a file of ours is read.
+const URDF_FIRST: &str =
+    "where it is a URDF, `regrasp inspect` makes a hand file of it, and `regrasp place HAND OBJECT` a scene of that";
+
+/// What to do with a file of the format `seen` where one of the format `wanted` is read; empty where nothing is known.
+fn other_kind(seen: &str, wanted: &str) -> &'static str {
+    match (seen, wanted) {
+        ("regrasp-hand", "regrasp-scene") => "`regrasp place HAND OBJECT` makes a scene of a hand file",
+        ("regrasp-scene", "regrasp-hand") => {
+            "`regrasp inspect` on a URDF writes a hand file; a scene names its own in `hand.file`"
+        }
+        _ => "",
+    }
+}
+
 /// The codes that a kind of file has for the faults found here.
 #[derive(Debug, Clone, Copy)]
 pub struct Codes {
@@ -84,10 +99,13 @@ impl<'a> Found<'a> {
     pub fn parse(&mut self) -> Option<Spanned<DeTable<'a>>> {
         let start = self.text.trim_start();
         if start.is_empty() || start.starts_with('<') {
-            let problem = if start.is_empty() { "is empty" } else { "looks like XML" };
+            let (problem, fix) = match start.is_empty() {
+                true => ("is empty", ""),
+                false => ("looks like XML", URDF_FIRST),
+            };
             let diagnostic =
                 Diagnostic::new(self.codes.syntax, Place::file(self.path), problem).expected("a TOML file");
-            self.diagnostics.push(diagnostic);
+            self.diagnostics.push(diagnostic.fix(fix));
             return None;
         }
         if let Some(at) = too_deep(self.text) {
@@ -414,7 +432,8 @@ impl<'a> Table<'a> {
         {
             let diagnostic = entry
                 .error(found.codes.other_format, found, format!("is \"{text}\""))
-                .expected(format!("\"{format}\""));
+                .expected(format!("\"{format}\""))
+                .fix(other_kind(text, format));
             found.diagnostics.push(diagnostic);
             return None;
         }

@@ -146,5 +146,8 @@ fn say(report: &Report, is_tracking: bool, elapsed: Duration, talk: &Talk) {
         1e3 * report.max_contact_error
     ));
     talk.say(format!("       {}, gravity {}", slip_in_words(report), gravity_in_words(report)));
+    for what in &report.assumed {
+        talk.say(format!("       taken for granted: {what}"));
+    }
     say_violations(report, talk);
 }

@@ -59,11 +59,20 @@ refused!(
     ["U200 hand.toml:1:10: string values must be quoted, expected literal string"]
 );
 refused!(an_empty_file, "", ["U200 hand.toml: is empty; expected a TOML file"]);
-refused!(a_urdf_called_toml, URDF, ["U200 hand.toml: looks like XML; expected a TOML file"]);
+refused!(
+    a_urdf_called_toml,
+    URDF,
+    [
+        "U200 hand.toml: looks like XML; expected a TOML file\n  fix: where it is a URDF, `regrasp inspect` makes a hand file of it, and `regrasp place HAND OBJECT` a scene of that"
+    ]
+);
 refused!(
     a_scene_file,
     "format = \"regrasp-scene\"\nformat_version = 1\ntask = \"in_hand\"\n",
-    [r#"U204 hand.toml:1:10 key "format": is "regrasp-scene"; expected "regrasp-hand""#]
+    [
+        "U204 hand.toml:1:10 key \"format\": is \"regrasp-scene\"; expected \"regrasp-hand\"\n  fix: `regrasp inspect` on a URDF writes a hand file; a scene \
+      names its own in `hand.file`"
+    ]
 );
 refused!(
     a_file_of_comments,

@@ -270,6 +270,10 @@ impl SurfaceKind for MeshSurface {
         self.surface_point(facet, on_surface)
     }
 
+    fn flat_normal(&self, at: &SurfacePoint) -> UnitVector {
+        self.face_normal(at.facet)
+    }
+
     fn signed_distance(&self, point: &Point) -> f64 {
         let (facet, on_surface, feature) = self.nearest(point, f64::INFINITY);
         self.signed(point - on_surface, facet, feature)

@@ -99,6 +99,10 @@ trait SurfaceKind: std::fmt::Debug + Send + Sync {
         self.cast_ray(origin, direction).into_iter().collect()
     }
     fn project(&self, point: &Point) -> SurfacePoint;
+    /// The normal at a point of the surface, not interpolated.
+    fn flat_normal(&self, at: &SurfacePoint) -> UnitVector {
+        at.normal_in_object
+    }
     fn signed_distance(&self, point: &Point) -> f64;
     /// Both, of a point that is no farther from the surface than `reach`.
     fn project_signed(&self, point: &Point, _reach: f64) -> (SurfacePoint, f64) {
@@ -217,7 +221,8 @@ impl Surface {
     }
 
     /// The contact of a ball of radius `tip_radius` that touches the surface near `near` and penetrates nowhere; its
-    /// normal points from the contact to the ball's centre. See `settle.rs`. None when no such ball is within reach.
+    /// normal points from the contact to the ball's centre; that of a point, with the radius zero, is the normal of its triangle. See
+    /// `settle.rs`. None when no such ball is within reach.
     pub fn settle(&self, near: &SurfacePoint, tip_radius: f64) -> Option<SurfacePoint> {
         self.settle_counted(near, tip_radius, &mut 0)
     }

@@ -24,7 +24,9 @@ pub(super) fn settle(
     n_measured: &mut u64,
 ) -> Option<SurfacePoint> {
     if tip_radius == 0.0 {
-        return Some(*near);
+        // A point touches one triangle, not the smooth surface that the mesh stands for.
+        let normal = surface.kind.flat_normal(near);
+        return Some(SurfacePoint::new(near.point_in_object, normal, near.facet));
     }
     let mut center = near.point_in_object + near.normal_in_object.as_ref() * tip_radius;
     let mut last_push = near.normal_in_object.into_inner();

@@ -94,6 +94,8 @@ pub struct Bodies {
     /// Pairs to judge.
     pub pairs: Vec<Pair>,
     prepared: Arc<Prepared>,
+    /// Fingers whose links have no collision geometry.
+    bare: Vec<usize>,
 }
 
 /// Index of the object in [`Bodies::carriers`].
@@ -113,6 +115,7 @@ impl Bodies {
             items: Vec::new(),
             pairs: Vec::new(),
             prepared: prepared.clone(),
+            bare: Vec::new(),
         };
         bodies.add_hand(task, model)?;
         let object = task.object();
@@ -129,6 +132,16 @@ impl Bodies {
         bodies.add_resting(task)?;
         bodies.add_pairs(task);
         Ok(bodies)
+    }
+
+    /// What is not tested because fingers have no collision geometry, in words.
+    pub fn without_geometry(&self, model: &CheckedHand) -> Option<String> {
+        let names: Vec<String> = self.bare.iter().map(|&f| format!("\"{}\"", model.fingers[f].name)).collect();
+        let told = format!(
+            "the links of {} keep clear of everything: they have no collision geometry, so no distance of theirs was measured",
+            names.join(", ")
+        );
+        (!names.is_empty()).then_some(told)
     }
 
     /// Adds a shape that takes part in no pair yet.
@@ -191,6 +204,8 @@ impl Bodies {
                 (item.link, item.body_depth, item.is_tip) = (Some(LinkId(l)), body_depth, is_tip);
             }
         }
+        let is_bare = |f: &usize| self.items.iter().all(|item| item.owner != Owner::Finger(*f));
+        self.bare = (0..model.fingers.len()).filter(is_bare).collect();
         for (f, finger) in model.fingers.iter().enumerate() {
             if let Some((shape, turn)) = finger.own_shape() {
                 self.carriers.push(Carrier::Link(finger.path.clone()));

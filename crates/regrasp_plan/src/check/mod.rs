@@ -286,7 +286,8 @@ pub struct Report {
     pub violations: Vec<Violation>,
     /// What was not judged, and why; empty when everything was. Such a plan is never accepted.
     pub left_out: Vec<String>,
-    /// What is taken for granted because plans of this kind say nothing of it; empty where nothing is.
+    /// What is taken for granted because plans of this kind say nothing of it, or because the hand has nothing to test it with; empty where
+    /// nothing is.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub assumed: Vec<String>,
     /// How many violations were found, those not listed included.
@@ -498,6 +499,7 @@ fn judge(
             report.left_out.extend(leap.map(|leap| format!("motion between waypoints: {leap}")));
         }
         Ok(bodies) => {
+            report.assumed.extend(bodies.without_geometry(model));
             (report.min_clearance, report.n_distances) =
                 collision::check_collision(&bodies, model, plan, settings, log);
         }

@@ -157,7 +157,9 @@ fn syntax_error(path: &Path, error: &serde_json::Error) -> Diagnostic {
     let message = error.to_string();
     // serde_json repeats the place at the end of its message.
     let problem = message.rsplit_once(" at line ").map_or(message.as_str(), |(problem, _)| problem);
-    Diagnostic::new("C401", place, problem).expected("a plan file as in schema/plan.schema.json")
+    let is_toml = path.extension().is_some_and(|extension| extension == "toml");
+    let fix = if is_toml { "where this is a scene, `regrasp plan` makes a plan of it" } else { "" };
+    Diagnostic::new("C401", place, problem).expected("a plan file as in schema/plan.schema.json").fix(fix)
 }
 
 /// The version. Format and version come first: their message helps more than the first key that a later version has and this one

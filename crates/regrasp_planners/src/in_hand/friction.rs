@@ -20,12 +20,15 @@ const GRASPS: usize = 250;
 /// Share of the grasps in which every finger must be able to lift before friction counts as enough. By hand: scenes that are solved
 /// at once have more.
 const ENOUGH: f64 = 0.02;
-/// Coefficients that are tried, besides the scene's without its margin: rubber on most things, soft rubber.
+/// Coefficients of a scene that are tried, over its margin, besides the scene's own without it: rubber on most things, soft rubber.
 const MORE: [f64; 2] = [1.0, 1.5];
 
 /// In how many of the grasps drawn each finger may lift, with one friction coefficient.
 struct Lifts {
+    /// What contacts have, with the margin taken off.
     friction: f64,
+    /// What a scene would have to have for it; none for the scene's own without the margin.
+    of_scene: Option<f64>,
     of_finger: [usize; MAX_FINGERS],
 }
 
@@ -54,7 +57,7 @@ pub fn advise(model: &Model, ends: [&Pose; 2], seed: u64, failure: &mut Failure)
     let name = &model.view.hand.fingers[finger].name;
     let others: Vec<String> = better
         .iter()
-        .map(|other| format!("in {:.1} % with {}", 100.0 * share(other.of_finger[finger]), other.friction))
+        .map(|other| format!("in {:.1} % with {}", 100.0 * share(other.of_finger[finger]), in_words(other)))
         .collect();
     failure.message += &format!(
         "; friction is short: of {n_grasps} grasps drawn at start and goal, the other fingers hold without \"{name}\" in {:.1} % with \
@@ -65,15 +68,21 @@ pub fn advise(model: &Model, ends: [&Pose; 2], seed: u64, failure: &mut Failure)
         others.join(", ")
     );
     let are_soft = model.fingers.iter().all(|finger| matches!(finger.contact, ContactModel::SoftFinger { .. }));
-    failure.advice =
-        format!("{}; {}", what_helps(enough.friction, model.view.object.friction, are_soft), failure.advice);
+    failure.advice = format!("{}; {}", what_helps(enough.of_scene, are_soft), failure.advice);
 }
 
-/// What to change where the friction coefficient `enough` would do: nothing that the scene has already.
-fn what_helps(enough: f64, of_scene: f64, are_soft: bool) -> String {
-    let friction = match enough > of_scene {
-        true => format!("fingertips with more friction (friction = {enough})"),
-        false => "a smaller `friction_margin` in the settings, where the scene's friction is sure".to_owned(),
+fn in_words(lifts: &Lifts) -> String {
+    match lifts.of_scene {
+        Some(of_scene) => format!("{:.3} ({of_scene} over the margin)", lifts.friction),
+        None => format!("{} (no margin)", lifts.friction),
+    }
+}
+
+/// What to change where the friction `of_scene` would do, or the scene's own without its margin.
+fn what_helps(of_scene: Option<f64>, are_soft: bool) -> String {
+    let friction = match of_scene {
+        Some(enough) => format!("fingertips with more friction (friction = {enough})"),
+        None => "a smaller `friction_margin` in the settings, where the scene's friction is sure".to_owned(),
     };
     let soft = if are_soft { "" } else { ", or soft fingertips (contact = \"soft_finger\")" };
     friction + soft
@@ -83,11 +92,16 @@ fn what_helps(enough: f64, of_scene: f64, are_soft: bool) -> String {
 /// and more. None where some finger has no contact at either end.
 fn lifts(model: &Model, ends: [&Pose; 2], seed: u64) -> Option<(usize, Vec<Lifts>)> {
     let planned = model.frame.friction;
-    let mut levels = vec![planned];
-    let more = std::iter::once(model.view.object.friction).chain(MORE);
-    more.for_each(|friction| levels.extend((friction > 1.05 * levels[levels.len() - 1]).then_some(friction)));
-    let mut lifts: Vec<Lifts> =
-        levels.into_iter().map(|friction| Lifts { friction, of_finger: [0; MAX_FINGERS] }).collect();
+    let of_scene = model.view.object.friction;
+    let margin = of_scene / planned;
+    let more = MORE.into_iter().map(|value| (value / margin, Some(value)));
+    let mut levels: Vec<(f64, Option<f64>)> = std::iter::once((of_scene, None)).chain(more).collect();
+    levels.retain(|(friction, _)| *friction > 1.05 * planned);
+    levels.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut lifts: Vec<Lifts> = std::iter::once((planned, Some(of_scene)))
+        .chain(levels)
+        .map(|(friction, of_scene)| Lifts { friction, of_scene, of_finger: [0; MAX_FINGERS] })
+        .collect();
     let mut workspace = Workspace::new(model);
     let mut n_grasps = 0;
     for (end, pose) in ends.into_iter().enumerate() {
@@ -131,11 +145,11 @@ mod tests {
     #[test]
     fn nothing_is_advised_that_the_scene_has() {
         assert_eq!(
-            what_helps(1.0, 0.8, false),
+            what_helps(Some(1.0), false),
             "fingertips with more friction (friction = 1), or soft fingertips (contact = \"soft_finger\")"
         );
-        assert_eq!(what_helps(1.5, 0.8, true), "fingertips with more friction (friction = 1.5)");
-        let margin = what_helps(0.8, 0.8, true);
+        assert_eq!(what_helps(Some(1.5), true), "fingertips with more friction (friction = 1.5)");
+        let margin = what_helps(None, true);
         assert!(margin.contains("friction_margin") && !margin.contains("0.8") && !margin.contains("soft"), "{margin}");
     }
 }

@@ -104,7 +104,7 @@ fn a_failure_says_that_friction_is_short() {
         failure.message.contains("friction is short") && failure.message.contains("with friction 0.100"),
         "{failure:?}"
     );
-    assert!(failure.message.contains(" with 1"), "{}", failure.message);
+    assert!(failure.message.contains(" with 0.667 (1 over the margin)"), "{}", failure.message);
     assert!(failure.advice.starts_with("fingertips with more friction (friction = 1"), "{}", failure.advice);
     let failure = fail("friction = 1.5", "axis = \"x\", angle_deg = 175");
     assert!(!failure.message.contains("friction is short"), "{}", failure.message);

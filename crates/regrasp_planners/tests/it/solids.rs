@@ -10,6 +10,7 @@ use regrasp_plan::check::{CheckSettings, Report, ViolationKind};
 use regrasp_planners::in_hand::{InHandSettings, moved_fingers, plan_in_hand};
 use regrasp_planners::{Failure, FailureKind};
 use regrasp_robot::LoadOptions;
+use regrasp_robot::tip::TipShape;
 use regrasp_scene::{GRASP_TOLERANCE, GraspRequest, InHandQuery, LoadedScene, Object, load_scene};
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -207,6 +208,72 @@ fn contacts_of_an_object_with_a_hull_lie_on_its_mesh() {
             "seed {seed}: {:?}",
             report.violations
         );
+    }
+}
+
+/// The normal of a point that touches a mesh is that of the triangle that it touches, not of the smooth surface that the mesh stands for.
+#[test]
+fn fingertips_that_are_points_hold_curved_meshes() {
+    let folder = Folder::new("points");
+    let ring = |k: i32| (f64::from(k) / 24.0 * TAU / 2.0).sin_cos();
+    let rings: Vec<(f64, f64)> = (1..24).map(ring).map(|(sin, cos)| (0.032 * sin, -0.032 * cos)).collect();
+    let (vertices, triangles) = revolved(&rings);
+    folder.write_mesh("ball.obj", &(vertices.clone(), triangles.clone()));
+    let hand = std::fs::read_to_string(repository().join("assets/hands/wide_four_finger/hand.toml")).unwrap();
+    let urdf = repository().join("assets/hands/wide_four_finger/hand.urdf");
+    // A needle of 1 mm on each of the balls.
+    let hand = hand
+        .replace(
+            "shape = \"sphere\", radius = 0.005, center = [0, 0, 0]",
+            "shape = \"point\", position = [0, 0, 0.006]",
+        )
+        .replace("\"hand.urdf\"", &format!("{:?}", urdf.display().to_string()));
+    folder.write("needles.toml", &hand);
+    let loaded = folder.load(Some("needles.toml"), "mesh = { file = \"ball.obj\" }", TURN, "");
+    assert!(loaded.scene.hands[0].hand.fingers.iter().all(|finger| finger.tip.shape == TipShape::Point));
+    let faces: Vec<([Point; 3], Vector)> = triangles
+        .iter()
+        .map(|corners| corners.map(|corner| vertices[corner as usize]))
+        .map(|[a, b, c]| ([a, b, c], (b - a).cross(&(c - a)).normalize()))
+        .collect();
+    for plan in all_are_accepted(&loaded, 4) {
+        let contacts =
+            plan.segments.iter().flat_map(|segment| &segment.waypoints).flat_map(|waypoint| &waypoint.contacts);
+        for (point, normal) in contacts.filter_map(|contact| contact.point_in_object.zip(contact.normal_in_object)) {
+            let is_of_a_face = faces.iter().any(|([a, _, _], face)| {
+                (Point::from(point) - a).dot(face).abs() < 1e-9 && face.angle(&Vector::from(normal)) < 1e-6
+            });
+            assert!(is_of_a_face, "{point:?} {normal:?}");
+        }
+    }
+}
+
+/// A hand without geometry is accepted, and the checker says what it has not tested.
+#[test]
+fn fingers_without_geometry_are_named() {
+    let folder = Folder::new("bare");
+    let assets = repository().join("assets/hands/wide_four_finger");
+    let urdf = std::fs::read_to_string(assets.join("hand.urdf")).unwrap();
+    folder.write("hand.toml", &std::fs::read_to_string(assets.join("hand.toml")).unwrap());
+    for bare in [&[] as &[&str], &["north"], &["east", "north", "west", "south"]] {
+        let (mut link, mut is_left_out, mut kept) = ("", false, String::new());
+        for line in urdf.lines() {
+            link = line.split("<link name=\"").nth(1).unwrap_or(link);
+            is_left_out |= line.contains("<collision>") && bare.iter().any(|name| link.starts_with(name));
+            if !is_left_out {
+                kept += line;
+                kept.push('\n');
+            }
+            is_left_out &= !line.contains("</collision>");
+        }
+        folder.write("hand.urdf", &kept);
+        let loaded = folder.load(Some("hand.toml"), SPHERE, TURN, "");
+        let query = loaded.in_hand(0);
+        let report = judge(&loaded, &query, &plan_for(&loaded, &query, 0).unwrap());
+        assert!(report.accepted(), "{report:#?}");
+        let told = |name: &&str| report.assumed.iter().any(|line| line.contains(&format!("\"{name}\"")));
+        assert!(bare.iter().all(told) && report.assumed.len() == usize::from(!bare.is_empty()), "{:?}", report.assumed);
+        assert!(bare.len() != 1 || !told(&"east"), "{:?}", report.assumed);
     }
 }
 

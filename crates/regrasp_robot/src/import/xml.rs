@@ -39,8 +39,16 @@ pub(crate) fn parse<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Documen
                 let message = other.to_string();
                 let problem = message.rsplit_once(" at ").map_or(message.as_str(), |(problem, _)| problem);
                 let is_xacro = is_xacro_name(file) || text.contains("<xacro:");
-                let xacro = if is_xacro { other_form::xacro_command(file) } else { String::new() };
-                Diagnostic::new("U100", place, format!("is not well-formed XML: {problem}")).fix(xacro)
+                let extension = file.extension().and_then(|extension| extension.to_str()).unwrap_or("").to_lowercase();
+                let fix = match extension.as_str() {
+                    _ if is_xacro => other_form::xacro_command(file),
+                    "obj" | "stl" | "ply" | "off" | "dae" => {
+                        "this looks like a mesh: give the URDF of a hand; objects come after it, as in regrasp place HAND OBJECT"
+                            .to_owned()
+                    }
+                    _ => String::new(),
+                };
+                Diagnostic::new("U100", place, format!("is not well-formed XML: {problem}")).fix(fix)
             }
         }
         .into()

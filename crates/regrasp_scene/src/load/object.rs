@@ -168,6 +168,8 @@ const TOO_SMALL: f64 = 0.05;
 const LARGE: f64 = 0.5;
 /// A mesh whose largest extent is less than this times the size of the hand is noted.
 const SMALL: f64 = 0.1;
+/// A hand larger than this, in metres, has a mesh in another unit.
+const LARGEST_HAND: f64 = 3.0;
 /// Share of the hand's size that the middle extent of an object usually has.
 const USUAL: f64 = 0.25;
 
@@ -185,7 +187,12 @@ fn fits(shape: &Shape, line: &MeshLine, hand: f64, table: &Table, found: &mut Fo
         "the mesh is {:.4} x {:.4} x {:.4} m, and the hand {hand:.3} m from end to end",
         size.x, size.y, size.z
     );
-    let fix = format!("it is probably in {unit}: {}", line.scaled(factor));
+    let fix = match hand > LARGEST_HAND {
+        true => "no hand is so large: a mesh of its URDF is probably in millimetres (scale=\"0.001 0.001 0.001\"); `regrasp inspect` on the URDF \
+                 names the link"
+            .to_owned(),
+        false => format!("it is probably in {unit}: {}", line.scaled(factor)),
+    };
     if size.min() > TOO_LARGE * hand || size.max() < TOO_SMALL * hand {
         let expected = format!(
             "a smallest extent of at most {:.3} m and a largest of at least {:.3} m, which fingers can reach around",

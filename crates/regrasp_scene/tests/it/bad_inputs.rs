@@ -450,10 +450,14 @@ fn a_mesh_far_from_its_own_origin() {
 #[test]
 fn files_of_another_kind_are_one_complaint() {
     refused("", "S100 scene.toml: is empty; expected a TOML file");
-    refused("\n<robot name=\"r\"/>\n", "S100 scene.toml: looks like XML; expected a TOML file");
+    refused(
+        "\n<robot name=\"r\"/>\n",
+        "S100 scene.toml: looks like XML; expected a TOML file\n  fix: where it is a URDF, `regrasp inspect` makes a hand file of it, and `regrasp place HAND OBJECT` a scene of that",
+    );
     let hand = std::fs::read_to_string(repository().join("assets/hands/wide_four_finger/hand.toml")).unwrap();
     let messages = Folder::new().messages(&hand);
     assert!(messages.starts_with("S105") && messages.contains("is \"regrasp-hand\""), "{messages}");
+    assert!(messages.contains("fix: `regrasp place HAND OBJECT` makes a scene of a hand file"), "{messages}");
     assert_eq!(messages.lines().count(), 1, "{messages}");
 }
 

@@ -67,6 +67,9 @@ pub(super) fn plan_facts(plan: &Plan, report: &Report, judged: &Judged) -> Vec<(
     if let (Some(force), Some(moment)) = (report.max_force_residual, report.max_moment_residual) {
         fact("Forces balance", format!("within {force:.1e} N, {moment:.1e} N m"));
     }
+    for assumed in &report.assumed {
+        fact("Taken for granted", assumed.clone());
+    }
     fact("Friction", format!("{:.4}, margin {}", plan.promises.friction, plan.promises.friction_margin));
     fact("Method", plan.method.clone());
     fact("Seed", plan.seed.to_string());
