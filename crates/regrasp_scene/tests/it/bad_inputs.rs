@@ -458,7 +458,7 @@ fn files_of_another_kind_are_one_complaint() {
     let messages = Folder::new().messages(&hand);
     assert!(messages.starts_with("S105") && messages.contains("is \"regrasp-hand\""), "{messages}");
     assert!(messages.contains("fix: `regrasp place HAND OBJECT` makes a scene of a hand file"), "{messages}");
-    assert_eq!(messages.lines().count(), 1, "{messages}");
+    assert_eq!(messages.lines().filter(|line| !line.starts_with("  fix:")).count(), 1, "{messages}");
 }
 
 #[test]
