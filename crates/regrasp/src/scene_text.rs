@@ -114,9 +114,8 @@ pub fn object_of_scene(
     let several = document.get("objects").and_then(Value::as_array);
     let mut found = document.get("object").into_iter().chain(several.into_iter().flatten()).filter_map(Value::as_table);
     let object = found.find(is_called).ok_or_else(|| {
-        let problem = "has no object to be placed".to_owned();
         let fix = "the hand comes first, then a mesh, a shape or a scene file: regrasp place HAND OBJECT";
-        InputError::from(Diagnostic::new("S102", Place::file(path), problem).fix(fix))
+        InputError::from(Diagnostic::new("S102", Place::file(path), "has no object to be placed").fix(fix))
     })?;
     let mut object = object.clone();
     POSE_KEYS.iter().for_each(|key| {
