@@ -111,15 +111,21 @@ class Strict:
         return self._session.project(elsewhere, *args[1:], distance=distance, turn=turn, **more)
 
 
-def test_sessions_for_near_starts_are_asked_last_and_for_no_plans(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sessions_for_near_starts_are_asked_last_and_for_no_plans() -> None:
     scene = regrasp.load_scene(SCENES / "sphere_90x.toml")
     plant = MujocoPlant.of(scene, PlantSettings(seed=1), seed=1)
     # The usual session refuses every start, so all are those of the other.
     strict: Any = Strict(regrasp.Session(scene, settings=PLANNER), 1.0)
     near: Any = Strict(regrasp.Session(scene, settings=NEAR), 0.0)
-    monkeypatch.setattr(near, "plan", lambda *args, **more: pytest.fail("a plan was asked for"), raising=False)
-    settings = ExecutorSettings(anytime=False)
-    log = Executor(strict, plant, settings, near=[near]).run(turns(plant.pose, count=2, seed=3))
+    asked_for_plans: list[Any] = []
+
+    def planning(sessions: Any, *rest: Any) -> ChargedPlanning:
+        asked_for_plans.extend(sessions)
+        return ChargedPlanning(sessions, *rest)
+
+    executor = Executor(strict, plant, ExecutorSettings(anytime=False), planning=planning, near=[near])
+    assert asked_for_plans == [strict]
+    log = executor.run(turns(plant.pose, count=2, seed=3))
     assert log.status == "done" and log.n_reached == 2, log.message
     assert len(strict.asked) == len(near.asked) >= 2
     assert all(plan.settings["clearance"] == 0.0002 for plan in log.plans)

@@ -58,9 +58,9 @@ class Executor(Steering):
 
         planning: ``ThreadPlanning`` for robots; where nothing is said, ``ChargedPlanning`` for plants that know the truth, which are
         simulations, else ``ThreadPlanning``. careful: sessions of the same scene that are asked for plans first; loose: that are asked
-        last, and for starts that the session refuses; near: for starts that those refuse too, and for no plans; firm: that are asked before all others where ``grip`` says so; anew: of plans that
-        end in grasps that hold well, asked where no plan leads on. stiffness, damping: of the robot's joints, where they are not those of
-        replays.
+        last, and for starts that the session refuses; near: for starts that those refuse too, and for no plans; firm: that are asked before
+        all others where ``grip`` says so; anew: of plans that end in grasps that hold well, asked where no plan leads on. stiffness, damping:
+        of the robot's joints, where they are not those of replays.
         listener: is told every event, and what became of every goal, as it happens, on the thread that runs.
         """
         chosen = (settings or ExecutorSettings()).for_object(session.object)

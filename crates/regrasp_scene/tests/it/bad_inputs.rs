@@ -288,6 +288,16 @@ fn a_mesh_in_millimetres() {
     assert!((scaled.scene.objects[0].center_of_mass.coords - nalgebra::Vector3::repeat(0.02)).norm() < 1e-12);
 }
 
+/// The object is right then, and no other scale of it helps.
+#[test]
+fn a_hand_in_millimetres_is_what_is_wrong_and_not_the_object() {
+    let folder = Folder::new();
+    folder.edit("hand.urdf", |text| text.replace("radius=\"0.055\" length=\"0.01\"", "radius=\"55\" length=\"10\""));
+    let messages = folder.messages(&with("sphere = { radius = 0.032 }", "mesh = { file = \"cube.obj\" }"));
+    assert!(messages.starts_with("M201 scene.toml") && messages.contains("fix: no hand is so large"), "{messages}");
+    assert!(!messages.contains("it is probably in"), "{messages}");
+}
+
 #[test]
 fn scale_of_zero_is_refused_and_a_mirror_is_not() {
     let mesh = |scale: &str| {
