@@ -169,6 +169,28 @@ fn a_urdf_folder_may_name_files_of_its_package() {
 }
 
 #[test]
+fn where_the_package_is_known_the_fix_corrects_the_path_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "allegro/package.xml", "<package><name>allegro</name></package>");
+    write(folder.path(), "allegro/meshes/tip.obj", OBJ);
+    let refused = |name: &str| {
+        let urdf = write(folder.path(), "allegro/urdf/hand.urdf", with_mesh(name));
+        load(&urdf).expect_err("there is no such file").remove(0)
+    };
+    let misspelt = refused("package://allegro/meshes/tpi.obj");
+    assert!(misspelt.contains("fix: correct the path after the package, which is "), "{misspelt}");
+    assert!(misspelt.ends_with(": did you mean \"package://allegro/meshes/tip.obj\"?"), "{misspelt}");
+    assert_eq!(misspelt.matches("folder of that name").count(), 1, "the same folder is named once: {misspelt}");
+    let elsewhere = refused("package://allegro/collision/tip.obj");
+    assert!(elsewhere.contains("fix: correct the path") && !elsewhere.contains("did you mean"), "{elsewhere}");
+    assert!(elsewhere.contains("(a file of that name is at "), "{elsewhere}");
+    assert!(refused("package://alegro/meshes/tip.obj").contains("fix: --package alegro=DIR"), "no package, no path");
+    // Folders outside the package are not listed.
+    let outside = refused("package://allegro/../allegro/meshes/tpi.obj");
+    assert!(!outside.contains("did you mean"), "{outside}");
+}
+
+#[test]
 fn encodings_and_kinds_of_file() {
     let folder = tempfile::tempdir().unwrap();
     let good = "<robot name='r'><link name='a'/></robot>";

@@ -95,19 +95,46 @@ pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), 
             draw(path, &loaded, &queries, place, (&settings, arguments.seed, &budget), &packages, talk)?;
         }
     }
-    if found.tried.solved == 0 {
+    let was_cut = deadline.is_some_and(|deadline| Instant::now() >= deadline);
+    say_next(&found, arguments, was_cut, talk);
+    Ok(())
+}
+
+/// Says which turns nobody found from the pose of the first scene, and which command comes next.
+fn say_next(found: &Places, arguments: &args::Place, was_cut: bool, talk: &Talk) {
+    let names = names_of(arguments);
+    let probes = found.places.first().map_or(&[][..], |place| &place.probes);
+    let is_solved = |k: usize| probes.get(k).is_some_and(Probe::is_solved);
+    let (solved, open): (Vec<usize>, Vec<usize>) = (0..names.len()).partition(|&k| is_solved(k));
+    let named = |which: &[usize]| which.iter().map(|&k| names[k]).collect::<Vec<_>>().join(", ");
+    let cut = match was_cut {
+        true => format!("; --time-limit {} s stopped them", arguments.time_limit.as_secs_f64()),
+        false => String::new(),
+    };
+    if solved.is_empty() {
         let what = if arguments.hold { "no grasp that is planned and judged" } else { "none of the turns" };
-        let cut = match deadline.is_some_and(|deadline| Instant::now() >= deadline) {
-            true => format!("; --time-limit {} s stopped them", arguments.time_limit.as_secs_f64()),
-            false => String::new(),
-        };
         talk.note(&format!(
             "short searches found {what} at any pose{cut}: the scene has the pose that seems best, and its plan may need minutes or fail"
         ));
+    } else if !open.is_empty() {
+        talk.note(&format!(
+            "from the best pose short searches found {}, and not {}{cut}: a plan for that may need minutes or fail",
+            named(&solved),
+            named(&open)
+        ));
     }
     let hold = if arguments.hold { " --hold" } else { "" };
-    talk.say(format!("next   regrasp plan {}{hold} -o plan.json", arguments.output.display()));
-    Ok(())
+    // Without a name `plan` takes the first task.
+    let task = match solved.first() {
+        Some(&k) if k > 0 => format!(" --task {}", names[k]),
+        _ => String::new(),
+    };
+    talk.say(format!("next   regrasp plan {}{task}{hold} -o plan.json", arguments.output.display()));
+}
+
+/// Names of the tasks, in the order of the probes.
+fn names_of(arguments: &args::Place) -> Vec<&str> {
+    if arguments.hold { vec!["hold"] } else { arguments.turns.iter().map(Turn::name).collect() }
 }
 
 fn place_pose(place: &Place) -> serde_json::Value {
@@ -126,7 +153,7 @@ fn say_places(found: &Places, arguments: &args::Place, seconds: f64, talk: &Talk
         tried.solved,
         duration(seconds)
     ));
-    let names: Vec<&str> = if arguments.hold { vec!["hold"] } else { arguments.turns.iter().map(Turn::name).collect() };
+    let names = names_of(arguments);
     talk.say(format!("       {:<24}  {:>6}  {:>9}  short searches", "position", "turned", "evidence"));
     for place in &found.places {
         let p = place.world_from_object.translation.vector;

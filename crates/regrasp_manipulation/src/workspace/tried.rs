@@ -1,12 +1,17 @@
 //! Contacts that fingers can bring their tips to, and what is in the way there.
 
 use crate::model::{Model, Pair};
+use regrasp_robot::inspect::tip_report;
 use std::collections::BTreeMap;
 
 /// A finger with fewer contacts tried is not told about.
 const FEWEST: u64 = 40;
 /// A pair that is in the way of this share of a finger's contacts is told.
 const SHARE: f64 = 0.7;
+const TIPS_THAT_FIT: &str = "let `regrasp inspect` on the URDF write fingertips that nothing stands out of, or shrink the links' collision \
+     geometry where it is larger than the links";
+const ANOTHER_POSE: &str = "move the start pose to where fingertips touch the object first (`regrasp place` looks for such a pose), scale the \
+     object to the sizes that `regrasp inspect` names, or shrink the links' collision geometry where it is larger than the links";
 
 /// Contacts tried, and those at which two bodies were too near.
 #[derive(Debug, Clone, Default)]
@@ -50,19 +55,36 @@ impl Tried {
     /// The links of fingers that touch the object before their tips do, at most contacts, in words; None where there are none.
     pub fn in_words(&self, model: &Model) -> Option<String> {
         let told: Vec<String> = self
-            .blocked
-            .iter()
-            .filter_map(|(&(finger, pair), &count)| {
-                let tried = *self.contacts.get(&finger)?;
-                let is_own = model.fingers[finger].bodies.contains(&pair.a) && pair.b == model.object;
-                let share = count as f64 / tried as f64;
-                (is_own && tried >= FEWEST && share >= SHARE).then(|| {
-                    let body = &model.bodies[pair.a].name;
-                    let behind = if pair.tip_of.is_some() { "stands out of its tip" } else { "is in the way" };
-                    format!("\"{body}\" {behind} at {:.0} % of the {tried} contacts tried", 100.0 * share)
-                })
+            .in_the_way(model)
+            .map(|(_, pair, tried, share)| {
+                let body = &model.bodies[pair.a].name;
+                let behind = if pair.tip_of.is_some() { "touches it beside its tip" } else { "is in the way" };
+                format!("\"{body}\" {behind} at {:.0} % of the {tried} contacts tried", 100.0 * share)
             })
             .collect();
         (!told.is_empty()).then(|| format!("links touch the object before fingertips do: {}", told.join(", ")))
+    }
+
+    /// What would help against links that touch the object before fingertips do: other tips only where collision geometry stands out of those
+    /// that the hand file declares.
+    pub fn advice(&self, model: &Model) -> &'static str {
+        let hand = model.view.hand;
+        let stands_out = |(finger, pair, ..): (usize, Pair, u64, f64)| {
+            pair.tip_of.is_some() && !tip_report(hand, &hand.fingers[finger]).stands_out.is_empty()
+        };
+        match self.in_the_way(model).any(stands_out) {
+            true => TIPS_THAT_FIT,
+            false => ANOTHER_POSE,
+        }
+    }
+
+    /// Finger, pair, contacts tried and share of them, of the links of fingers that touch the object before their tips do at most contacts.
+    fn in_the_way<'a>(&'a self, model: &'a Model) -> impl Iterator<Item = (usize, Pair, u64, f64)> + 'a {
+        self.blocked.iter().filter_map(move |(&(finger, pair), &count)| {
+            let tried = *self.contacts.get(&finger)?;
+            let is_own = model.fingers[finger].bodies.contains(&pair.a) && pair.b == model.object;
+            let share = count as f64 / tried as f64;
+            (is_own && tried >= FEWEST && share >= SHARE).then_some((finger, pair, tried, share))
+        })
     }
 }

@@ -13,11 +13,12 @@ use regrasp_manipulation::failure::{Failure, FailureKind};
 use regrasp_manipulation::following::{joints_in_words, refuse_fingers_that_cannot_follow};
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::{Model, fingers_in_words, friction_in_words, releasable};
-use regrasp_scene::{GraspRequest, InHandQuery};
+use regrasp_scene::{GraspRequest, InHandQuery, STANDARD_GRAVITY};
 
 /// Refuses what no search can find: hands that cannot hold or never change their grasp, poses at which the object is buried.
 pub fn refuse_hopeless(model: &Model, settings: &InHandSettings, query: &InHandQuery) -> Result<(), Failure> {
     refuse_holding_nothing(model)?;
+    refuse_too_heavy(model)?;
     if !query.stays() {
         refuse_hand_that_cannot_follow(model)?;
         refuse_method_without_free_fingers(model, settings)?;
@@ -57,6 +58,29 @@ pub fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
     );
     let advice = if may_close(&all, USUAL_FRICTION) { MORE_FRICTION } else { MORE_FINGERS };
     Err(Failure::bare(FailureKind::Impossible, message, advice))
+}
+
+/// Refuses objects that weigh more than all fingertips together press with, each at its largest normal force and as far from the normal as
+/// friction allows.
+pub fn refuse_too_heavy(model: &Model) -> Result<(), Failure> {
+    let Some(forces) = &model.forces else { return Ok(()) };
+    let (mass, n, largest) = (model.view.object.mass, model.n_fingers(), forces.limits().largest);
+    let (weight, held) = (mass * STANDARD_GRAVITY, n as f64 * largest * model.frame.friction.hypot(1.0));
+    if weight <= held {
+        return Ok(());
+    }
+    let name = &model.view.object.name;
+    let message = format!(
+        "\"{name}\" weighs {weight:.0} N ({mass} kg), and {n} fingertips that press with at most {largest} N each, friction {}, hold at \
+         most {held:.0} N together: no contact forces balance the weight",
+        friction_in_words(model)
+    );
+    let advice = format!(
+        "give the object's mass in kilograms, {:.2} at most (mass of the object; for `regrasp place`, --mass); or let stronger fingers press \
+         harder (forces.normal_force in --settings, and normal_force in [limits] of the scene)",
+        (100.0 * held / STANDARD_GRAVITY).floor() / 100.0
+    );
+    Err(Failure::bare(FailureKind::Impossible, message, &advice))
 }
 
 /// Refuses to move the object with hands of which the fingers that could follow it cannot hold it.

@@ -12,7 +12,9 @@ use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, Level};
 use regrasp_plan::plan::{SegmentKind, Waypoint};
 use regrasp_planners::Failure;
+use regrasp_planners::FailureKind;
 use regrasp_planners::in_hand::PhysicsSettings;
+use regrasp_planners::in_hand::placing::place;
 use regrasp_planners::in_hand::{ForceSettings, InHandSettings, plan_in_hand};
 use regrasp_scene::{Gravity, Limits, LoadedScene, Scene};
 
@@ -337,7 +339,8 @@ fn without_forces_there_is_no_plan_and_the_cause_is_named() {
         let causes: Vec<&str> = failure.causes.iter().map(|cause| cause.reason.as_str()).collect();
         (causes.join("\n"), failure.advice)
     };
-    let (causes, _) = fails(&changed("sphere_90x.toml", |scene| scene.objects[0].mass = 20.0), &settings());
+    // Four fingertips at 15 N and friction 0.8 over 1.5 hold 68 N together, and no grasp has them all pull upwards.
+    let (causes, _) = fails(&changed("sphere_90x.toml", |scene| scene.objects[0].mass = 6.9), &settings());
     assert!(causes.contains("no contact forces balance the weight: "), "{causes}");
     let strong = ForceSettings { normal_force: [2.0, 500.0], ..ForceSettings::default() };
     let (causes, _) = fails(
@@ -365,6 +368,19 @@ fn without_forces_there_is_no_plan_and_the_cause_is_named() {
     assert!(plan.promises.forces.is_none());
     let waypoints = || plan.segments.iter().flat_map(|segment| &segment.waypoints);
     assert!(waypoints().all(|w| w.joint_torques.is_empty() && w.contacts.iter().all(|c| c.force_in_object.is_none())));
+}
+
+#[test]
+fn an_object_heavier_than_all_fingertips_hold_is_refused_before_the_search() {
+    let heavy = changed("sphere_90x.toml", |scene| scene.objects[0].mass = 7.0);
+    let query = heavy.in_hand(0);
+    let planned = plan_in_hand(&heavy.view(), &query, &settings(), 0, &Budget::unlimited(), &|_| {});
+    let failure = planned.expect_err("4 x 15 N x sqrt(1 + (0.8 / 1.5)^2) is 68 N");
+    assert_eq!((failure.kind, failure.statistics.work), (FailureKind::Impossible, 0), "{failure:?}");
+    assert!(failure.message.contains("weighs 69 N (7 kg)") && failure.message.contains("at most 68 N"), "{failure:?}");
+    assert!(failure.advice.contains("6.93 at most"), "{failure:?}");
+    let placed = place(&heavy.view(), &[query.held()], &settings(), (0, 1), &Budget::unlimited(), &|_| {});
+    assert_eq!(placed.expect_err("nor can it be held elsewhere").message, failure.message);
 }
 
 #[test]

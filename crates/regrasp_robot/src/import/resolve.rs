@@ -4,6 +4,7 @@
 //! called NAME, `DIR/share/NAME`); the folder above the model whose `package.xml` has that name; a folder of that name
 //! beside the model or one of the folders above it. Nothing is executed and nothing is fetched.
 
+use regrasp_base::diagnostic::did_you_mean;
 use regrasp_base::{Diagnostic, Place};
 use std::ffi::OsStr;
 use std::fs;
@@ -90,9 +91,21 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// A file with the same last name near the model, where hints are asked for.
-    fn same_name(&self, wanted: &Path) -> Option<PathBuf> {
-        if self.hints == Hints::None { None } else { same_name_near(&self.folder, wanted) }
+    /// A file with the same last name below `folder`, where hints are asked for.
+    fn same_name(&self, folder: &Path, wanted: &Path) -> Option<PathBuf> {
+        if self.hints == Hints::None { None } else { same_name_below(folder, wanted) }
+    }
+
+    /// The path of the file in the folder of `root`/`inside` whose name is nearest to that of `inside`, below `root`.
+    fn similar(&self, root: &Path, inside: &Path) -> Option<PathBuf> {
+        let is_below = inside.components().all(|component| matches!(component, Component::Normal(_)));
+        if self.hints == Hints::None || !is_below {
+            return None;
+        }
+        let listed = fs::read_dir(root.join(inside).parent()?).ok()?.take(MAX_ENTRIES_FOR_HINT);
+        let names: Vec<String> = listed.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
+        let meant = did_you_mean(inside.file_name()?.to_str()?, names.iter().map(String::as_str))?;
+        Some(inside.with_file_name(meant))
     }
 }
 
@@ -128,7 +141,8 @@ fn in_package(name: &str, rest: &str, place: Place, search: &Search) -> Result<R
     };
     let inside = Path::new(inside.trim_start_matches('/'));
     let mut tried = Vec::new();
-    for (source, root) in package_roots(package, &search.folder, search.options, &mut tried) {
+    let roots = package_roots(package, &search.folder, search.options, &mut tried);
+    for (source, root) in &roots {
         let (path, mut notes) = match existing(&root.join(inside)) {
             Some(found) => found,
             None => {
@@ -136,17 +150,28 @@ fn in_package(name: &str, rest: &str, place: Place, search: &Search) -> Result<R
                 continue;
             }
         };
-        if source == Source::FolderOfThatName {
+        if *source == Source::FolderOfThatName {
             notes.push(format!("package \"{package}\" has no package.xml; the folder {} is taken", root.display()));
         }
-        let resolved = within(name, &path, &[root], place, search)?;
+        let resolved = within(name, &path, std::slice::from_ref(root), place, search)?;
         return Ok(Resolved { path: resolved.path, notes });
     }
     let numbered: Vec<String> = tried.iter().enumerate().map(|(i, text)| format!("({}) {text}", i + 1)).collect();
-    let hint =
-        search.same_name(inside).map_or(String::new(), |p| format!(" (a file of that name is at {})", p.display()));
+    let folder = roots.first().map_or(search.folder.as_path(), |(_, root)| root.as_path());
+    let hint = search
+        .same_name(folder, inside)
+        .map_or(String::new(), |p| format!(" (a file of that name is at {})", p.display()));
+    let fix = match roots.first() {
+        None => format!("--package {package}=DIR"),
+        Some((_, root)) => {
+            let meant = search
+                .similar(root, inside)
+                .map_or(String::new(), |meant| format!(": did you mean \"package://{package}/{}\"?", meant.display()));
+            format!("correct the path after the package, which is {}{meant}", root.display())
+        }
+    };
     Err(Diagnostic::new("U101", place, format!("\"{name}\" not found; looked in: {}", numbered.join(" ")))
-        .fix(format!("--package {package}=DIR{hint}")))
+        .fix(format!("{fix}{hint}")))
 }
 
 /// Where a candidate for a package comes from.
@@ -212,11 +237,12 @@ fn package_roots(
     }
     let before = roots.len();
     for dir in &above {
-        if dir.file_name() == Some(OsStr::new(package)) {
-            roots.push((Source::FolderOfThatName, dir.clone()));
-        }
-        if dir.join(package).is_dir() {
-            roots.push((Source::FolderOfThatName, dir.join(package)));
+        let own = (dir.file_name() == Some(OsStr::new(package))).then(|| dir.clone());
+        let below = Some(dir.join(package)).filter(|below| below.is_dir());
+        for root in own.into_iter().chain(below) {
+            if roots[before..].iter().all(|(_, known)| *known != root) {
+                roots.push((Source::FolderOfThatName, root));
+            }
         }
     }
     if roots.len() == before {
@@ -254,7 +280,7 @@ fn within(
 ) -> Result<Resolved, Diagnostic> {
     let Some((path, notes)) = existing(path) else {
         let hint = search
-            .same_name(Path::new(name))
+            .same_name(&search.folder, Path::new(name))
             .map_or(String::new(), |found| format!("a file of that name is at {}", found.display()));
         let problem = if path.is_dir() { "is a folder" } else { "not found" };
         return Err(Diagnostic::new("U101", place, format!("\"{name}\" {problem}; looked in: {}", path.display()))
@@ -328,8 +354,8 @@ fn existing(path: &Path) -> Option<(PathBuf, Vec<String>)> {
     found.is_file().then(|| (found, vec![remark]))
 }
 
-/// A file with the same last name below the model's folder or the one above it.
-fn same_name_near(folder: &Path, wanted: &Path) -> Option<PathBuf> {
+/// A file with the same last name below `folder`.
+fn same_name_below(folder: &Path, wanted: &Path) -> Option<PathBuf> {
     let name = wanted.file_name()?;
     let mut left = MAX_ENTRIES_FOR_HINT;
     let mut waiting = vec![folder.to_owned()];

@@ -44,14 +44,14 @@ pub struct TipRegion {
 }
 
 impl TipReach {
-    /// Samples `n_postures` postures, uniform in the joint limits.
+    /// Samples `n_postures` postures, uniform in the joint limits; joints without limits within a quarter of a turn from rest.
     pub fn sample(hand: &Hand, n_postures: usize, rng: &mut Rng) -> Self {
         let touch = Touch::new(hand);
         let always = touch.count(ALWAYS_POSTURES, rng);
         let excused: Vec<bool> = always.iter().map(|&count| count == ALWAYS_POSTURES).collect();
         let mut tips: Vec<(usize, Point, Vector)> = Vec::with_capacity(n_postures * hand.fingers.len());
         for _ in 0..n_postures {
-            let posture = touch.draw_posture(rng);
+            let posture = touch.draw_posture_near_rest(rng);
             let blocked = touch.fingers_in_their_own_way(&posture, &excused);
             for (f, finger) in hand.fingers.iter().enumerate().filter(|(f, _)| !blocked[*f]) {
                 let body = finger.chain.last_frame(&posture[f]);

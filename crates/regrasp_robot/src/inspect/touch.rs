@@ -1,13 +1,13 @@
 //! Which links of a hand touch each other, in one posture and over many.
 
-use crate::hand::Hand;
+use crate::hand::{Finger, Hand};
 use crate::robot::LinkId;
 use regrasp_base::Rng;
 use regrasp_geometry::collision::{Placed, Placement, Separation, separation};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Point, Pose, Vector};
 use std::collections::BTreeSet;
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Pairs of links of a hand that are tested against each other, with everything needed to test them.
 pub(crate) struct Touch<'h> {
@@ -155,15 +155,26 @@ impl<'h> Touch<'h> {
         !matches!(answer, Separation::SeparatedBy(_))
     }
 
-    /// A posture, uniform in the limits of joints and brought within those of sums.
+    /// A posture, uniform in the limits of joints and brought within those of sums. Joints without limits turn once.
     pub fn draw_posture(&self, rng: &mut Rng) -> Vec<Vec<f64>> {
-        let of_finger = |finger: &crate::hand::Finger| {
-            let ends = finger.chain.lower.iter().zip(&finger.chain.upper);
-            let finite = |end: f64| if end.is_finite() { end } else { PI.copysign(end) };
-            let drawn: Vec<f64> = ends.map(|(&low, &high)| rng.uniform(finite(low), finite(high))).collect();
+        self.draw_within(PI, |_, _| 0.0, rng)
+    }
+
+    /// The same, but joints without limits turn by at most a quarter of a turn from rest, either way: fingers that hold an object between them
+    /// do not turn away from it.
+    pub fn draw_posture_near_rest(&self, rng: &mut Rng) -> Vec<Vec<f64>> {
+        self.draw_within(FRAC_PI_2, |finger, k| finger.rest[k], rng)
+    }
+
+    /// Joints without limits turn by at most `turn`, in radians, from `middle`.
+    fn draw_within(&self, turn: f64, middle: impl Fn(&Finger, usize) -> f64, rng: &mut Rng) -> Vec<Vec<f64>> {
+        let mut of_finger = |finger: &Finger| {
+            let end = |end: f64, k: usize| if end.is_finite() { end } else { middle(finger, k) + turn.copysign(end) };
+            let ends = finger.chain.lower.iter().zip(&finger.chain.upper).enumerate();
+            let drawn: Vec<f64> = ends.map(|(k, (&low, &high))| rng.uniform(end(low, k), end(high, k))).collect();
             finger.chain.bring_within_limits(&drawn).unwrap_or(drawn)
         };
-        self.hand.fingers.iter().map(of_finger).collect()
+        self.hand.fingers.iter().map(&mut of_finger).collect()
     }
 
     /// Per pair, in how many of `n_postures` postures, uniform in the limits of joints and brought within those of sums, it touches.

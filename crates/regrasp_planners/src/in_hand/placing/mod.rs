@@ -1,10 +1,14 @@
 //! Where to hold an object: poses in which the hand has force-closed grasps that let every finger go, and from which the turns that
 //! are asked for look possible. Many poses are estimated, some looked at with all links, and from a few short searches are made.
 
+/// Many poses, estimated.
+mod estimating;
 /// What a hand can really do at a pose.
 pub mod evidence;
 /// What would help where the start has no grasp.
 pub mod hint;
+/// A look with all links.
+mod looking;
 /// A quick estimate of it.
 pub mod outlook;
 /// Plans whose start pose the planner chooses.
@@ -15,57 +19,39 @@ pub mod probe;
 pub mod proposals;
 /// Contacts spread over the object.
 pub mod samples;
+/// Where short searches are made.
+mod searching;
 /// Which sizes of objects fit a hand.
 pub mod sizes;
 
-use crate::in_hand::attempt::search::{Context, Search};
+use crate::in_hand::attempt::search::Context;
 use crate::in_hand::attempt::tally::{Reason, Tally};
 use crate::in_hand::effective;
 use crate::settings::InHandSettings;
 pub use hint::with_hint;
 pub use planned::plan_placed;
 
-use evidence::Evidence;
+use estimating::{Turns, estimated};
+use looking::Looks;
 use outlook::Outlook;
-use probe::{Probe, probe};
+use probe::Probe;
 use proposals::Proposals;
 use regrasp_base::{Budget, Interrupt, Rng};
-use regrasp_geometry::{Pose, frame, interpolate_pose};
-use regrasp_manipulation::ends::blocked::object_blocked_by;
+use regrasp_geometry::Pose;
 use regrasp_manipulation::failure::{Cause, Failure, FailureKind, NearestMiss};
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::progress::Progress;
 use regrasp_plan::plan::PoseData;
 use regrasp_robot::inspect::TipReach;
 use regrasp_scene::{HandView, InHandQuery};
+use searching::ShortSearches;
 use std::sync::atomic::AtomicUsize;
 
 /// Postures from which it is known where fingertips reach.
 const POSTURES: usize = 12_000;
-/// Poses drawn at first.
-const DRAWN: usize = 6_000;
-/// Rounds in which poses are drawn near the best ones, how many of these there are, and how many are drawn near each.
-const ROUNDS: (usize, usize, usize) = (3, 24, 40);
-/// Poses that are looked at with all links: those that look best, and others spread over those that look worse by at most this
-/// factor. By measurement on an Allegro hand, of those the estimate says little.
-const LOOKED_AT: (usize, usize) = (24, 24);
-const WORSE: f64 = 0.2;
-/// Poses from which short searches are made, a batch at a time until in one of them some turned out well.
-const PROBED: usize = 24;
-const BATCH: usize = 4;
-/// Poses from which every turn was found, at which no more are looked for; so many are searched from again.
-const ENOUGH: usize = 2;
-const AGAIN: usize = 4;
-/// Times that it is searched again where no turn was found. By measurement on the left LEAP hand (cube about z by 180 degrees): after 3 times no
-/// turn was found; with more, a pose from which 5 of 6 seeds have a plan within 400,000 configurations.
-const TIMES_AGAIN: u64 = 12;
-/// Work of a short search, and of those made again from the best poses.
-const PROBE_WORK: (u64, u64) = (25_000, 60_000);
 /// What is added to the plans found and to the work for a rate of plans that is never zero nor infinite; the first for a pose whose searches
 /// came all the way.
 const PRIOR: (f64, f64) = (0.2, 4_000.0);
-/// Poses count as different from this distance on, in metres, with angles weighed by the object's radius.
-const APART: f64 = 0.006;
 
 /// A pose of the object from which the hand is expected to do what is asked.
 #[derive(Debug, Clone)]
@@ -127,6 +113,7 @@ pub fn place(
     let settings = &effective(settings).within(&view.limits);
     let model = &Model::new(view, &settings.physics);
     super::refusals::refuse_holding_nothing(model)?;
+    super::refusals::refuse_too_heavy(model)?;
     // The poses are those of a start at the origin; a query that stays there stays everywhere.
     let moves = queries.iter().any(|query| !query.stays());
     if moves {
@@ -144,61 +131,27 @@ pub fn place(
     }
     let outlook = Outlook::new(model, &reach, &mut rng);
     let mut tried = Tried::default();
-    let best = estimated(&asked, &proposals, &outlook, &mut rng, &mut tried);
+    let estimated = estimated(&asked, &proposals, &outlook, &mut rng, &mut tried);
 
     let winner = AtomicUsize::new(usize::MAX);
     let context = Context { model, settings, seed, budget, winner: &winner, progress };
-    let look = |(index, (_, start)): &(usize, (f64, Pose))| {
-        let mut search = Search::new(context, [Pose::identity(); 2], 0, u64::MAX);
-        search.rng = Rng::keyed(seed, "place_evidence", *index as u64);
-        search.holds_only = !moves;
-        let first = Evidence::gather(&mut search, start);
-        let mut worths = vec![first.worth(model)];
-        if first.grasp.is_some() {
-            let others = asked.others(start);
-            worths.extend(others.iter().map(|pose| Evidence::gather(&mut search, pose).worth(model)));
-        }
-        (first.grasp, worths, search.workspace.work, search.whole_tally())
-    };
-    let mut places: Vec<Place> = Vec::new();
-    let (mut cut, mut looked_work, mut tally) = (None, 0, Tally::default());
-    let numbered: Vec<(usize, (f64, Pose))> = best.iter().copied().enumerate().collect();
-    // Several poses at the same time. What one thread would not have come to, because the work is spent, does not count.
-    'looks: for together in numbered.chunks(settings.n_threads.max(1)) {
-        cut = budget.check(looked_work).err();
-        if cut.is_some() {
-            break;
-        }
-        for ((_, (worth, start)), (grasp, worths, work, seen)) in together.iter().zip(at_once(together, look)) {
-            cut = budget.check(looked_work).err();
-            if cut.is_some() {
-                break 'looks;
-            }
-            tried.looked_at += 1;
-            looked_work += work;
-            tally.merge(&seen);
-            let Some(grasp) = grasp else { continue };
-            tried.with_grasp += 1;
-            let evidence = (worths.iter().map(|worth| worth.ln()).sum::<f64>() / worths.len() as f64).exp();
-            places.push(Place {
-                world_from_object: view.world_from(start),
-                outlook: *worth,
-                evidence,
-                probes: Vec::new(),
-                joints: grasp.joints.iter().flatten().copied().collect(),
-            });
-        }
+    let tally = Tally::default();
+    let mut looks = Looks { context, asked: &asked, moves, places: Vec::new(), tally, tried, n_given: 0 };
+    let mut cut = looks.look_at(&estimated.best);
+    let searches = ShortSearches { view, queries, settings, seed, budget };
+    searches.first(&mut looks.places, &mut looks.tried)?;
+    if looks.tried.solved == 0 && cut.is_none() {
+        cut = looks.widen(&estimated, &proposals, &outlook, &mut rng);
+        searches.first(&mut looks.places, &mut looks.tried)?;
     }
-    tried.work += looked_work;
     if cut == Some(Interrupt::Cancelled) {
         return Err(Failure::bare(FailureKind::Interrupted, "interrupted".into(), ""));
     }
+    let Looks { mut places, tally, mut tried, .. } = looks;
     if places.is_empty() {
-        return Err(not_found(model, &best, (&tally, !moves), &tried, cut));
+        return Err(not_found(model, &estimated.best, (&tally, !moves), &tried, cut));
     }
-    // Stable: of equals the one that was estimated better stays first.
-    places.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    search_from(&mut places, view, queries, (settings, seed, budget), &mut tried)?;
+    searches.again(&mut places, &mut tried)?;
     places.sort_by(|a, b| b.rate().total_cmp(&a.rate()));
     places.truncate(n_wanted.max(1));
     Ok(Places { places, tried })
@@ -212,65 +165,6 @@ fn reach_of(model: &Model, reach: &TipReach) -> TipReach {
 
 /// How near a contact is to one of those spread over an object, in metres, about.
 const NEARBY: f64 = 0.008;
-
-/// Makes short searches from places, best first, until some turn out well, and again from the best of these; where none was found, some
-/// more times from those that seem best by then. The answer does not depend on the number of threads.
-fn search_from(
-    places: &mut [Place],
-    view: &HandView,
-    queries: &[InHandQuery],
-    (settings, seed, budget): (&InHandSettings, u64, &Budget),
-    tried: &mut Tried,
-) -> Result<(), Failure> {
-    // Several places at the same time. What one thread would not have come to, because the work is spent, does not count.
-    let search = |places: &mut [&mut Place], round: u64, tried: &mut Tried| -> Result<usize, Failure> {
-        // Another seed than that of the plan: what is asked is how often a plan is found.
-        let seed = seed.wrapping_add(1 + round);
-        let work = if round == 0 { PROBE_WORK.0 } else { PROBE_WORK.1 };
-        let probe_all =
-            |place: &&mut Place| probe(view, queries, &place.world_from_object, (settings, seed, budget), work);
-        let mut n_searched = 0;
-        for together in places.chunks_mut(settings.n_threads.max(1)) {
-            if budget.check(tried.work).is_err() {
-                break;
-            }
-            let seen = at_once(together, probe_all);
-            for (place, probes) in together.iter_mut().zip(seen) {
-                if budget.check(tried.work).is_err() {
-                    return Ok(n_searched);
-                }
-                let probes = probes?;
-                tried.work += probes.iter().map(|probe| probe.work).sum::<u64>();
-                match place.probes.is_empty() {
-                    true => place.probes = probes,
-                    false => place.probes.iter_mut().zip(probes).for_each(|(known, new)| known.add(new)),
-                }
-                n_searched += 1;
-            }
-        }
-        Ok(n_searched)
-    };
-    let n_solved = |places: &[Place]| places.iter().filter(|place| place.is_solved()).count();
-    for first in (0..places.len().min(PROBED)).step_by(BATCH) {
-        let last = (first + BATCH).min(places.len());
-        let mut batch: Vec<&mut Place> = places[first..last].iter_mut().collect();
-        tried.probed += search(&mut batch, 0, tried)? as u64;
-        if n_solved(places) >= ENOUGH {
-            break;
-        }
-    }
-    for round in 1..=TIMES_AGAIN {
-        places.sort_by(|a, b| b.rate().total_cmp(&a.rate()));
-        let mut again: Vec<&mut Place> =
-            places.iter_mut().take(AGAIN).filter(|place| !place.probes.is_empty()).collect();
-        let n_searched = search(&mut again, round, tried)?;
-        if n_searched == 0 || n_solved(places) > 0 || queries.iter().all(InHandQuery::stays) {
-            break;
-        }
-    }
-    tried.solved = n_solved(places) as u64;
-    Ok(())
-}
 
 /// What `look` says of every item, in their order; each is looked at by a thread of its own.
 fn at_once<I: Sync, T: Send>(items: &[I], look: impl Fn(&I) -> T + Sync) -> Vec<T> {
@@ -302,119 +196,6 @@ impl Place {
         let rate = |probe: &Probe| (f64::from(probe.n_solved) + prior(probe)) / (probe.work as f64 + work);
         self.probes.iter().map(rate).reduce(f64::min).unwrap_or(0.0)
     }
-}
-
-/// What is asked of a place.
-struct Turns<'a> {
-    view: &'a HandView<'a>,
-    queries: &'a [InHandQuery],
-}
-
-impl Turns<'_> {
-    /// Orientation at the start in the hand's frame, where the queries give it.
-    fn rotation(&self) -> Option<nalgebra::UnitQuaternion<f64>> {
-        let given = self.queries.iter().find_map(|query| query.open_start.as_ref()?.rotation)?;
-        let in_world = Pose::from_parts(nalgebra::Translation3::identity(), given);
-        Some(self.view.hand_from(&in_world).rotation)
-    }
-
-    /// Poses that the object passes after it starts at `start`, half way of every leg and at its end; all in the hand's frame.
-    fn others(&self, start: &Pose) -> Vec<Pose> {
-        let mut others = Vec::new();
-        for query in self.queries {
-            let poses = query.started_at(&self.view.world_from(start)).poses();
-            for leg in poses.windows(2).filter(|leg| leg[0] != leg[1]) {
-                others.push(self.view.hand_from(&interpolate_pose(&leg[0], &leg[1], 0.5)));
-                others.push(self.view.hand_from(&leg[1]));
-            }
-        }
-        others
-    }
-}
-
-/// Estimates many poses; those that look best, apart from each other and with the object clear of palm and obstacles, best first.
-fn estimated(
-    asked: &Turns,
-    proposals: &Proposals,
-    outlook: &Outlook,
-    rng: &mut Rng,
-    tried: &mut Tried,
-) -> Vec<(f64, Pose)> {
-    let estimate = |start: &Pose, tried: &mut Tried| {
-        tried.poses += 1;
-        let mut worth = outlook.worth(start);
-        for pose in asked.others(start) {
-            if worth <= outlook.nothing() {
-                break;
-            }
-            worth = worth.min(outlook.worth(&pose));
-        }
-        worth
-    };
-    let mut known: Vec<(f64, Pose)> = Vec::with_capacity(DRAWN);
-    for _ in 0..DRAWN {
-        let pose = proposals.draw(rng);
-        known.push((estimate(&pose, tried), pose));
-    }
-    let (n_rounds, n_centers, n_near) = ROUNDS;
-    for _ in 0..n_rounds {
-        let centers = best_apart(outlook.model(), asked, &mut known, n_centers, &mut tried.blocked);
-        for (_, center) in centers {
-            for _ in 0..n_near {
-                let pose = proposals.near(&center, rng);
-                known.push((estimate(&pose, tried), pose));
-            }
-        }
-    }
-    tried.blocked = 0;
-    tried.work += tried.poses;
-    let (n_best, n_others) = LOOKED_AT;
-    let mut best = best_apart(outlook.model(), asked, &mut known, n_best, &mut tried.blocked);
-    let least = best.first().map_or(0.0, |(worth, _)| WORSE * worth);
-    let last = best.last().map_or(0.0, |(worth, _)| *worth);
-    let mut others: Vec<(f64, Pose)> =
-        known.into_iter().filter(|(worth, _)| *worth >= least && *worth < last && *worth > outlook.nothing()).collect();
-    rng.shuffle(&mut others);
-    let clear = others.into_iter().filter(|(_, pose)| {
-        let is_clear = |pose: &Pose| object_blocked_by(outlook.model(), pose).is_none();
-        is_clear(pose) && asked.others(pose).iter().all(is_clear)
-    });
-    best.extend(clear.take(n_others));
-    best.retain(|(worth, _)| *worth > outlook.nothing());
-    best
-}
-
-/// The best of `known`, apart from each other and clear of palm and obstacles; those that are not are taken out.
-fn best_apart(
-    model: &Model,
-    asked: &Turns,
-    known: &mut Vec<(f64, Pose)>,
-    n_wanted: usize,
-    n_blocked: &mut u64,
-) -> Vec<(f64, Pose)> {
-    known.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut best: Vec<(f64, Pose)> = Vec::with_capacity(n_wanted);
-    let mut blocked = Vec::new();
-    for (index, (worth, pose)) in known.iter().enumerate() {
-        if best.len() == n_wanted {
-            break;
-        }
-        let is_near = |(_, other): &(f64, Pose)| frame::pose_distance(other, pose, model.turn_length()) < APART;
-        if best.iter().any(is_near) {
-            continue;
-        }
-        let is_blocked = |pose: &Pose| object_blocked_by(model, pose).is_some();
-        if is_blocked(pose) || asked.others(pose).iter().any(is_blocked) {
-            blocked.push(index);
-        } else {
-            best.push((*worth, *pose));
-        }
-    }
-    *n_blocked += blocked.len() as u64;
-    blocked.into_iter().rev().for_each(|index| {
-        known.remove(index);
-    });
-    best
 }
 
 /// Why no place was found: the causes, and the pose that looked best.

@@ -95,11 +95,7 @@ impl Left {
         let more = allow_more(interrupt.into());
         let advice = match (self.tally.weak_joints(model), causes.first()) {
             (Some(weak), _) => format!("lower the mass of the object, or use stronger motors: {weak}"),
-            _ if in_the_way.is_some() => {
-                "let `regrasp inspect` on the URDF write fingertips that nothing stands out of, or shrink the links' collision \
-                 geometry where it is larger than the links"
-                    .into()
-            }
+            _ if in_the_way.is_some() => self.tally.tried.advice(model).into(),
             (None, Some(cause)) if nearest_miss.is_none() => {
                 format!("{MOVE_THE_START} (mostly: {})", cause.reason)
             }
