@@ -1,7 +1,8 @@
 """How many resting states of replays are starts: ``python -m regrasp.execute.resting SCENE...``.
 
 A replay is stopped where the plan rests, between two segments. What the simulation has there is projected, and what comes of it is
-planned from, with a little work: planning must not refuse it.
+planned from, with a little work: planning must not refuse it. Both with the sessions of the executor: that for starts with links nearer to
+the object projects, and makes no plans.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ from .._model import Pose, load_scene
 from .._plan import Plan
 from .._planning import export_mjcf
 from .._planning import plan as plan_scene
-from .._session import Session, Start
+from .._session import Start
 from ..simulate import replay
 from ..simulate.controllers import Controller
 from ..simulate.model import Settings, make_rig
 from ..simulate.plans import flat
 from ..simulate.reference import reference
-from .settings import NEAR
+from .sessions import ExecutorSessions
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -41,7 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
     all_states = all_starts = 0
     for path in asked.scenes:
         scene = load_scene(path, packages=packages)
-        session = Session(scene, settings=NEAR)
+        sessions = ExecutorSessions.of(scene)
         n_states, n_starts, n_late = 0, 0, 0
         times: list[float] = []
         moved: list[tuple[float, float, float]] = []
@@ -57,14 +58,14 @@ def main(arguments: list[str] | None = None) -> int:
                     break
                 n_states += 1
                 begun = time.perf_counter()
-                start = session.project(pose, joints)
+                start = sessions.near.project(pose, joints)
                 times.append(time.perf_counter() - begun)
                 if not isinstance(start, Start):
                     causes[start.message] += 1
                     continue
                 n_starts += 1
                 moved.append((max(start.moved["object"], start.moved["tip"]), start.moved["object_turn"], start.moved["joint"]))
-                later = session.plan(start, plan.goal, seed=seed, max_work=300)
+                later = sessions.loose.plan(start, plan.goal, seed=seed, max_work=300)
                 if not isinstance(later, Plan) and later.kind in ("start_invalid", "rejected"):
                     n_late += 1
                     causes[f"later: {later.message}"] += 1

@@ -3,7 +3,7 @@
 use crate::words::metres;
 use regrasp::InHandSettings;
 use regrasp::base::Rng;
-use regrasp::planners::in_hand::placing::sizes::{Size, fingers_that_only_hold, sizes};
+use regrasp::planners::in_hand::placing::sizes::{Size, fingers_that_only_hold, never_lets_go, sizes};
 use regrasp::robot::Hand;
 use regrasp::robot::inspect::{TipReach, TipRegion};
 use serde::Serialize;
@@ -25,6 +25,8 @@ pub struct Room {
     refusal: Option<String>,
     /// Which fingers cannot follow an object that moves; none where all of them can.
     only_hold: Option<String>,
+    /// Why the hand can never change its grasp; none where it can.
+    never_lets_go: Option<String>,
 }
 
 impl Room {
@@ -35,10 +37,12 @@ impl Room {
         let region = reach.region(FINGERS.min(hand.fingers.len()));
         let settings = InHandSettings::default();
         let only_hold = fingers_that_only_hold(hand, &settings);
-        match sizes(hand, &reach, &settings, seed) {
-            Ok(balls) => Room { region, balls, refusal: None, only_hold },
-            Err(failure) => Room { region, balls: Vec::new(), refusal: Some(failure.message), only_hold },
-        }
+        let never_lets_go = never_lets_go(hand, &settings);
+        let (balls, refusal) = match sizes(hand, &reach, &settings, seed) {
+            Ok(balls) => (balls, None),
+            Err(failure) => (Vec::new(), Some(failure.message)),
+        };
+        Room { region, balls, refusal, only_hold, never_lets_go }
     }
 
     /// Adds it to a report.
@@ -64,6 +68,9 @@ impl Room {
         }
         if let Some(only_hold) = &self.only_hold {
             let _ = writeln!(out, "  {only_hold}");
+        }
+        if let Some(never_lets_go) = &self.never_lets_go {
+            let _ = writeln!(out, "  {never_lets_go}");
         }
         if let Some(refusal) = &self.refusal {
             let _ = writeln!(out, "  balls: {refusal}");

@@ -115,13 +115,12 @@ const MORE_FINGERS: &str = "use a hand with at least 4 fingers, or declare soft 
      \"soft_finger\" and torsion_radius = 0.005 in the hand file; for `regrasp place`, --torsion-radius 0.005)";
 
 fn never_released(model: &Model) -> String {
-    format!(
-        "the hand has {} and friction {}: while one of them is away the others cannot hold an object (fewer than three points \
-         cannot: it turns about the line through two of them). Such a hand can never change its grasp",
-        fingers_in_words(model),
-        friction_in_words(model)
-    )
+    format!("the hand has {} and friction {}: {NEVER_CHANGES}", fingers_in_words(model), friction_in_words(model))
 }
+
+/// Why a hand that holds things can never change its grasp of them.
+pub const NEVER_CHANGES: &str = "while one of them is away the others cannot hold an object (fewer than three points cannot: it turns about the \
+     line through two of them). Such a hand can never change its grasp";
 
 /// What a search with such a hand that found no transfer comes to: `failure` with the reason for which transfers are all that
 /// it has.

@@ -1,6 +1,6 @@
 //! Start poses that the planner chooses, and grasps that only hold.
 
-use crate::places::repository;
+use crate::places::{repository, shared_models};
 use crate::queries::Queries;
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::{Pose, Vector};
@@ -18,12 +18,17 @@ use regrasp_scene::{HandView, LoadedScene, load_scene_text};
 
 /// A scene of a bundled hand with an object, whose start is open.
 fn scene(hand: &str, object: &str, start: &str, turn: &str) -> LoadedScene {
+    scene_with(hand, object, start, turn, &LoadOptions::default())
+}
+
+/// The same, read with options.
+fn scene_with(hand: &str, object: &str, start: &str, turn: &str, options: &LoadOptions) -> LoadedScene {
     let text = format!(
         "format = \"regrasp-scene\"\nformat_version = 1\ntask = \"in_hand\"\n[hand]\nfile = \"assets/hands/{hand}\"\n\
          [object]\n{object}\nmass = 0.1\nfriction = 0.8\n[start]\n{start}\n[goal]\nturn = {{ {turn} }}\n"
     );
     let path = repository().join("placing.toml");
-    load_scene_text(&path, text.into_bytes(), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+    load_scene_text(&path, text.into_bytes(), options).unwrap_or_else(|error| panic!("{error}"))
 }
 
 const WIDE: &str = "wide_four_finger/hand.toml";
@@ -65,6 +70,26 @@ fn a_place_depends_on_the_seed_alone_and_plans_start_there() {
         let report = loaded.judge(&query, &plan, &CheckSettings::default());
         assert!(report.accepted(), "{:?}", report.violations);
     }
+}
+
+/// A book in the Allegro hand: of the poses that the estimate puts first sixteen have a grasp, and no short search finds a turn from them.
+#[test]
+fn where_the_best_estimates_lead_to_no_turn_places_are_looked_for_elsewhere() {
+    let Some(models) = shared_models() else { return };
+    let mut options = LoadOptions::default();
+    options.resolve.packages = vec![("models".to_owned(), models)];
+    let loaded = scene_with("allegro_right/hand.toml", "box = { size = [0.2, 0.06, 0.03] }", AUTO, TURN, &options);
+    let [one, three] = [1, 3].map(|n_threads| {
+        let settings = InHandSettings { n_threads, ..InHandSettings::default() };
+        place(&loaded.view(), &[loaded.in_hand(0)], &settings, (0, 3), &Budget::unlimited(), &|_| {}).unwrap()
+    });
+    assert!(one.tried.looked_at > 48 && one.tried.solved > 0, "{:?}", one.tried);
+    assert_eq!(one.tried, three.tried);
+    let query = loaded.in_hand(1).started_at(&one.places[0].world_from_object);
+    let plan = plan_in_hand(&loaded.view(), &query, &InHandSettings::default(), 1, &Budget::work(2_000_000), &|_| {})
+        .unwrap_or_else(|failure| panic!("{failure}"));
+    let report = loaded.judge(&query, &plan, &CheckSettings::default());
+    assert!(report.accepted(), "{:?}", report.violations);
 }
 
 #[test]

@@ -209,6 +209,24 @@ mod tests {
     }
 
     #[test]
+    fn joints_without_limits_are_drawn_near_rest_where_that_is_asked() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/hands/wide_four_finger/hand.toml");
+        let mut hand = load_hand(&path, &LoadOptions::default()).unwrap().hand;
+        let finger = &mut hand.fingers[1];
+        (finger.chain.lower[0], finger.chain.upper[0], finger.rest[0]) = (f64::NEG_INFINITY, f64::INFINITY, 0.4);
+        let (touch, mut rng) = (Touch::new(&hand), Rng::keyed(0, "test", 0));
+        let (mut near, mut any) = (0.0f64, 0.0f64);
+        for _ in 0..500 {
+            let posture = touch.draw_posture_near_rest(&mut rng);
+            near = near.max((posture[1][0] - 0.4).abs());
+            any = any.max(touch.draw_posture(&mut rng)[1][0].abs());
+            let within = hand.fingers.iter().zip(&posture).all(|(finger, q)| finger.chain.within_limits(q, 1e-12));
+            assert!(within, "{posture:?}");
+        }
+        assert!((1.5..=FRAC_PI_2).contains(&near) && (3.0..=PI).contains(&any), "{near} {any}");
+    }
+
+    #[test]
     fn fingers_of_capsules_touch_where_their_cores_are_near() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/hands/wide_four_finger/hand.toml");
         let hand = load_hand(&path, &LoadOptions::default()).unwrap().hand;

@@ -5,13 +5,14 @@ use super::outlook::Outlook;
 use super::proposals::Proposals;
 use super::samples::ContactSamples;
 use crate::in_hand::attempt::search::{Context, Search};
+use crate::in_hand::refusals;
 use crate::settings::InHandSettings;
 use regrasp_base::{Budget, Rng};
 use regrasp_geometry::surface::DEFAULT_CREASE_ANGLE;
 use regrasp_geometry::{Point, Pose, Shape, Surface};
 use regrasp_manipulation::ends::blocked::object_blocked_by;
 use regrasp_manipulation::failure::Failure;
-use regrasp_manipulation::model::Model;
+use regrasp_manipulation::model::{Model, fingers_in_words};
 use regrasp_robot::Hand;
 use regrasp_robot::inspect::TipReach;
 use regrasp_scene::{Limits, Manipulation, Object, Scene, SceneHand, State};
@@ -52,7 +53,7 @@ pub fn sizes(hand: &Hand, reach: &TipReach, settings: &InHandSettings, seed: u64
         Failure::refuse_tied_fingers(&view)?;
         let model = Model::new(&view, &settings.physics);
         let reach = &super::reach_of(&model, reach);
-        crate::in_hand::refusals::refuse_holding_nothing(&model)?;
+        refusals::refuse_holding_nothing(&model)?;
         let mut rng = Rng::keyed(seed, "sizes", index as u64);
         // Which contacts of a ball close does not depend on its size.
         let (known, unit) = samples.get_or_insert_with(|| (radius, ContactSamples::draw(&model, &mut rng)));
@@ -92,6 +93,21 @@ pub fn sizes(hand: &Hand, reach: &TipReach, settings: &InHandSettings, seed: u64
     Ok(found)
 }
 
+/// Why `hand` can hold objects and never change its grasp of them, and what would help, in words. None for hands that can, that hold nothing, or
+/// whose fingers cannot follow an object: that is said otherwise.
+pub fn never_lets_go(hand: &Hand, settings: &InHandSettings) -> Option<String> {
+    let scene = scene_of(hand, ball(RADII[0])?);
+    let state = State::at_rest(&scene, vec![Pose::identity()]);
+    let view = regrasp_scene::HandView::of(&Manipulation::first(&scene, &state));
+    Failure::refuse_many_fingers(&view).ok()?;
+    let model = Model::new(&view, &settings.physics);
+    refusals::refuse_holding_nothing(&model).and_then(|()| refusals::refuse_hand_that_cannot_follow(&model)).ok()?;
+    let may_try_transfers = model.n_fingers() == 2 || settings.search.transfers_alone;
+    let failure = refusals::refuse_impossible(&model).err().filter(|_| !may_try_transfers)?;
+    let (fingers, why) = (fingers_in_words(&model), refusals::NEVER_CHANGES);
+    Some(format!("it cannot turn objects: it has {fingers}, and {why}. To turn some {}", failure.advice))
+}
+
 /// Which fingers of `hand` cannot follow an object that moves, and whether the hand can turn objects all the same, in words. None where
 /// all of them follow.
 pub fn fingers_that_only_hold(hand: &Hand, settings: &InHandSettings) -> Option<String> {
@@ -103,7 +119,7 @@ pub fn fingers_that_only_hold(hand: &Hand, settings: &InHandSettings) -> Option<
     if model.closing_fingers() == 0 {
         return None;
     }
-    if let Err(failure) = crate::in_hand::refusals::refuse_hand_that_cannot_follow(&model) {
+    if let Err(failure) = refusals::refuse_hand_that_cannot_follow(&model) {
         return Some(failure.message);
     }
     let names: Vec<&str> =
