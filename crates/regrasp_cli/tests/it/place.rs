@@ -42,6 +42,21 @@ fn a_scene_that_was_placed_is_planned_without_an_edit() {
     }
 }
 
+/// Of two turns of a board one is found: the other is named, and what comes next plans the one that was.
+#[test]
+fn turns_that_were_not_found_are_named() {
+    let folder = Folder::new();
+    let hand = hand_of(&folder);
+    let arguments = ["place", &hand, "box:0.2,0.1,0.03", "--turn", "x:180", "--turn", "z:40", "-o", "board.toml"];
+    let placed = folder.run(&arguments);
+    assert_eq!(placed.code, Some(0), "{placed:?}");
+    for words in ["short searches found z40, and not x180", "next   regrasp plan board.toml --task z40 -o plan.json"] {
+        assert!(placed.err.contains(words), "{words} is missing:\n{}", placed.err);
+    }
+    let plan = folder.run(&["plan", "board.toml", "--task", "z40", "-o", "plan.json"]);
+    assert!(plan.code == Some(0) && plan.err.contains("ACCEPTED"), "{plan:?}");
+}
+
 /// What the scene of the folder calls its hand.
 fn hand_of(folder: &Folder) -> String {
     let text = std::fs::read_to_string(folder.path("scene.toml")).unwrap();
