@@ -4,6 +4,7 @@ use crate::{Failure, GraspList, GraspSettings, list_grasps};
 use regrasp_base::diagnostic::number;
 use regrasp_base::{Budget, Diagnostic, InputError, Place, files};
 use regrasp_geometry::{Point, Vector};
+use regrasp_grasp::held_at_most;
 use regrasp_grasp::list::{GraspKind, format};
 use regrasp_planners::FailureKind;
 use regrasp_robot::manipulator::MountedHand;
@@ -201,8 +202,8 @@ pub fn refuse_too_heavy(scene: &Scene, query: &PickAndPlaceQuery) -> Result<(), 
     let object = &scene.objects[query.object];
     let settings = GraspSettings::default();
     let normal_force = settings.forces.normal_force[1].min(scene.limits.normal_force);
-    let largest_force = normal_force * (object.friction / settings.friction_margin).hypot(1.0);
-    let of_hand = |hand: usize| (scene.hands[hand].hand.fingers.len() as f64 * largest_force, hand);
+    let friction = object.friction / settings.friction_margin;
+    let of_hand = |hand: usize| (held_at_most(scene.hands[hand].hand.fingers.len(), normal_force, friction), hand);
     let strongest = hands_of(scene, query).into_iter().map(of_hand).max_by(|a, b| a.0.total_cmp(&b.0));
     let Some((held, hand)) = strongest else { return Ok(()) };
     let weight = object.mass * STANDARD_GRAVITY;

@@ -21,4 +21,4 @@ pub mod wrench;
 pub use closure::{Closure, GraspFrame, Separation, Verdict, closure_margin};
 pub use contact::{Contact, ContactForce, ContactModel, Grip};
 pub use list::{GraspList, ListedGrasp};
-pub use wrench::{ForceLimits, ForceProblem, NoForces, Wrench};
+pub use wrench::{ForceLimits, ForceProblem, NoForces, Wrench, held_at_most};

@@ -282,7 +282,7 @@ fn inspect_writes_a_hand_file_that_plans() {
     for word in ["east_abduction", "revolute", "4 fingers", "ball of radius 5.0 mm"] {
         assert!(run.out.contains(word), "{word} is missing:\n{}", run.out);
     }
-    assert!(!run.out.contains("cannot turn objects"), "{}", run.out);
+    assert!(!run.out.contains("never change its grasp"), "{}", run.out);
     folder.edit("scene.toml", "hand.toml", "guessed.toml");
     let plan = folder.run(&["plan", "scene.toml", "-o", "plan.json"]);
     assert_eq!(plan.code, Some(0), "{plan:?}");
@@ -303,7 +303,7 @@ fn real_hands() {
     assert_eq!(check.code, Some(0), "{check:?}");
     let dclaw = models.join("hands/dclaw/dclaw.urdf");
     let run = folder.run(&["inspect", dclaw.to_str().unwrap(), "--package", &package, "--samples", "200"]);
-    for words in ["it cannot turn objects: it has 3 fingers", "can never change its grasp", "--torsion-radius 0.005"] {
+    for words in ["it can never change its grasp: it has 3 fingers", "three points cannot", "--torsion-radius 0.005"] {
         assert!(run.out.contains(words), "{words} is missing: {}", run.out);
     }
     let started = Instant::now();

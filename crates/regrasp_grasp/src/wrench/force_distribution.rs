@@ -107,6 +107,12 @@ pub struct ForceLimits {
     pub cone_weight: f64,
 }
 
+/// The most that so many fingertips could hold together, in newtons: each presses with the normal force `largest`, in newtons, along
+/// the edge of its friction cone, and all of these forces point straight up.
+pub fn held_at_most(n_fingers: usize, largest: f64, friction: f64) -> f64 {
+    n_fingers as f64 * largest * friction.hypot(1.0)
+}
+
 /// A grasp under load.
 #[derive(Debug, Clone, Copy)]
 pub struct ForceProblem<'a> {

@@ -11,5 +11,5 @@ pub mod linear_program;
 /// Newton steps, contact by contact.
 pub use force_distribution::{
     BalancedForces, ForceLimits, ForceProblem, JointRow, JointRows, NoForces, Reserve, Rubbing, Wrench, any_inside,
-    can_balance, distribute, distribute_if_any,
+    can_balance, distribute, distribute_if_any, held_at_most,
 };

@@ -8,8 +8,10 @@ use std::collections::BTreeMap;
 const FEWEST: u64 = 40;
 /// A pair that is in the way of this share of a finger's contacts is told.
 const SHARE: f64 = 0.7;
+/// What helps against tips that are smaller than their links.
 const TIPS_THAT_FIT: &str = "let `regrasp inspect` on the URDF write fingertips that nothing stands out of, or shrink the links' collision \
      geometry where it is larger than the links";
+/// What helps where the tips are as they should be.
 const ANOTHER_POSE: &str = "move the start pose to where fingertips touch the object first (`regrasp place` looks for such a pose), scale the \
      object to the sizes that `regrasp inspect` names, or shrink the links' collision geometry where it is larger than the links";
 
@@ -86,5 +88,34 @@ impl Tried {
             let share = count as f64 / tried as f64;
             (is_own && tried >= FEWEST && share >= SHARE).then_some((finger, pair, tried, share))
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::PhysicsSettings;
+    use regrasp_robot::LoadOptions;
+    use regrasp_robot::tip::TipShape;
+    use regrasp_scene::load_scene;
+
+    /// A tip link that is in the way: another pose helps, and other tips only where the declared one is smaller than its link.
+    #[test]
+    fn other_tips_are_advised_only_where_the_link_stands_out_of_its_tip() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
+        let mut loaded = load_scene(&path, &LoadOptions::default()).unwrap();
+        let advice = |loaded: &regrasp_scene::LoadedScene| {
+            let view = loaded.view();
+            let model = Model::new(&view, &PhysicsSettings::default());
+            let pair = *model.pairs.iter().find(|pair| pair.tip_of == Some(0)).expect("the tip's link and the object");
+            let mut tried = Tried::default();
+            (0..FEWEST).for_each(|_| tried.add(0, Some(pair)));
+            assert!(tried.in_words(&model).expect("it is always in the way").contains("beside its tip"));
+            tried.advice(&model)
+        };
+        assert_eq!(advice(&loaded), ANOTHER_POSE);
+        let TipShape::Sphere { radius } = &mut loaded.scene.hands[0].hand.fingers[0].tip.shape else { panic!() };
+        *radius -= 0.001;
+        assert_eq!(advice(&loaded), TIPS_THAT_FIT);
     }
 }

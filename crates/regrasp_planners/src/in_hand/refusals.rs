@@ -5,6 +5,7 @@ use regrasp_base::Rng;
 use regrasp_geometry::Pose;
 use regrasp_grasp::ContactModel;
 use regrasp_grasp::closure::may_close;
+use regrasp_grasp::held_at_most;
 use regrasp_manipulation::ends::blocked::{refuse_buried_object, refuse_object_out_of_reach};
 use regrasp_manipulation::ends::end::End;
 use regrasp_manipulation::ends::given_grasp::{Near, given_grasp_at};
@@ -60,12 +61,11 @@ pub fn refuse_holding_nothing(model: &Model) -> Result<(), Failure> {
     Err(Failure::bare(FailureKind::Impossible, message, advice))
 }
 
-/// Refuses objects that weigh more than all fingertips together press with, each at its largest normal force and as far from the normal as
-/// friction allows.
+/// Refuses objects that weigh more than all fingertips hold together, before any search.
 pub fn refuse_too_heavy(model: &Model) -> Result<(), Failure> {
     let Some(forces) = &model.forces else { return Ok(()) };
     let (mass, n, largest) = (model.view.object.mass, model.n_fingers(), forces.limits().largest);
-    let (weight, held) = (mass * STANDARD_GRAVITY, n as f64 * largest * model.frame.friction.hypot(1.0));
+    let (weight, held) = (mass * STANDARD_GRAVITY, held_at_most(n, largest, model.frame.friction));
     if weight <= held {
         return Ok(());
     }
@@ -115,12 +115,16 @@ const MORE_FINGERS: &str = "use a hand with at least 4 fingers, or declare soft 
      \"soft_finger\" and torsion_radius = 0.005 in the hand file; for `regrasp place`, --torsion-radius 0.005)";
 
 fn never_released(model: &Model) -> String {
-    format!("the hand has {} and friction {}: {NEVER_CHANGES}", fingers_in_words(model), friction_in_words(model))
+    format!(
+        "the hand has {} and friction {}: {OTHERS_CANNOT_HOLD}. Such a hand can never change its grasp",
+        fingers_in_words(model),
+        friction_in_words(model)
+    )
 }
 
 /// Why a hand that holds things can never change its grasp of them.
-pub const NEVER_CHANGES: &str = "while one of them is away the others cannot hold an object (fewer than three points cannot: it turns about the \
-     line through two of them). Such a hand can never change its grasp";
+pub const OTHERS_CANNOT_HOLD: &str = "while one of them is away the others cannot hold an object (fewer than three points cannot: it turns about \
+     the line through two of them)";
 
 /// What a search with such a hand that found no transfer comes to: `failure` with the reason for which transfers are all that
 /// it has.

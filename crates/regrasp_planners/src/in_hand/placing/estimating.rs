@@ -65,6 +65,7 @@ impl Turns<'_> {
 /// What the estimate says of `start`, a pose of the object in the hand's frame: the least of all poses on the way.
 fn estimate(asked: &Turns, outlook: &Outlook, start: &Pose, tried: &mut Tried) -> f64 {
     tried.poses += 1;
+    tried.work += 1;
     let mut worth = outlook.worth(start);
     for pose in asked.others(start) {
         if worth <= outlook.nothing() {
@@ -101,7 +102,6 @@ pub fn estimated(
         }
     }
     tried.blocked = 0;
-    tried.work += tried.poses;
     let (n_best, n_others) = LOOKED_AT;
     let mut best = best_apart(outlook.model(), asked, &mut known, n_best, &mut tried.blocked);
     let least = best.first().map_or(0.0, |(worth, _)| WORSE * worth);

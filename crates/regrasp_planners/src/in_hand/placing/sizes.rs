@@ -96,38 +96,41 @@ pub fn sizes(hand: &Hand, reach: &TipReach, settings: &InHandSettings, seed: u64
 /// Why `hand` can hold objects and never change its grasp of them, and what would help, in words. None for hands that can, that hold nothing, or
 /// whose fingers cannot follow an object: that is said otherwise.
 pub fn never_lets_go(hand: &Hand, settings: &InHandSettings) -> Option<String> {
-    let scene = scene_of(hand, ball(RADII[0])?);
-    let state = State::at_rest(&scene, vec![Pose::identity()]);
-    let view = regrasp_scene::HandView::of(&Manipulation::first(&scene, &state));
-    Failure::refuse_many_fingers(&view).ok()?;
-    let model = Model::new(&view, &settings.physics);
-    refusals::refuse_holding_nothing(&model).and_then(|()| refusals::refuse_hand_that_cannot_follow(&model)).ok()?;
-    let may_try_transfers = model.n_fingers() == 2 || settings.search.transfers_alone;
-    let failure = refusals::refuse_impossible(&model).err().filter(|_| !may_try_transfers)?;
-    let (fingers, why) = (fingers_in_words(&model), refusals::NEVER_CHANGES);
-    Some(format!("it cannot turn objects: it has {fingers}, and {why}. To turn some {}", failure.advice))
+    with_a_ball(hand, settings, |model| {
+        refusals::refuse_holding_nothing(model).and_then(|()| refusals::refuse_hand_that_cannot_follow(model)).ok()?;
+        let may_try_transfers = model.n_fingers() == 2 || settings.search.transfers_alone;
+        let failure = refusals::refuse_impossible(model).err().filter(|_| !may_try_transfers)?;
+        let (fingers, why) = (fingers_in_words(model), refusals::OTHERS_CANNOT_HOLD);
+        Some(format!("it can never change its grasp: it has {fingers}, and {why}. To turn objects {}", failure.advice))
+    })
 }
 
 /// Which fingers of `hand` cannot follow an object that moves, and whether the hand can turn objects all the same, in words. None where
 /// all of them follow.
 pub fn fingers_that_only_hold(hand: &Hand, settings: &InHandSettings) -> Option<String> {
+    with_a_ball(hand, settings, |model| {
+        if model.closing_fingers() == 0 {
+            return None;
+        }
+        if let Err(failure) = refusals::refuse_hand_that_cannot_follow(model) {
+            return Some(failure.message);
+        }
+        let closing = (0..model.n_fingers()).filter(|&f| model.fingers[f].closes());
+        let names: Vec<&str> = closing.map(|f| hand.fingers[f].name.as_str()).collect();
+        Some(format!(
+            "fingers that hold an object only while it stands still, as their tips move in fewer than three directions: {}",
+            names.join(", ")
+        ))
+    })
+}
+
+/// What `say` says of the hand with the smallest ball; None for hands that no search takes.
+fn with_a_ball(hand: &Hand, settings: &InHandSettings, say: impl FnOnce(&Model) -> Option<String>) -> Option<String> {
     let scene = scene_of(hand, ball(RADII[0])?);
     let state = State::at_rest(&scene, vec![Pose::identity()]);
     let view = regrasp_scene::HandView::of(&Manipulation::first(&scene, &state));
     Failure::refuse_many_fingers(&view).ok()?;
-    let model = Model::new(&view, &settings.physics);
-    if model.closing_fingers() == 0 {
-        return None;
-    }
-    if let Err(failure) = refusals::refuse_hand_that_cannot_follow(&model) {
-        return Some(failure.message);
-    }
-    let names: Vec<&str> =
-        (0..model.n_fingers()).filter(|&f| model.fingers[f].closes()).map(|f| hand.fingers[f].name.as_str()).collect();
-    Some(format!(
-        "fingers that hold an object only while it stands still, as their tips move in fewer than three directions: {}",
-        names.join(", ")
-    ))
+    say(&Model::new(&view, &settings.physics))
 }
 
 fn ball(radius: f64) -> Option<Object> {
