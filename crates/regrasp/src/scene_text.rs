@@ -38,6 +38,9 @@ impl Turn {
         if !(angle_deg.abs() <= 3600.0) {
             return Err("expected degrees between -3600 and 3600".into());
         }
+        if angle_deg == 0.0 {
+            return Err("expected an angle other than 0; whether the object can be held is asked with --hold".into());
+        }
         let (axis, angle) = (axis.trim(), angle.trim());
         let (value, name) = match axis {
             "x" | "y" | "z" => (Value::String(axis.into()), format!("{axis}{angle}")),
@@ -245,7 +248,7 @@ mod tests {
         assert_eq!(Turn::read("z:90").unwrap().name(), "z90");
         let turn = Turn::read("1,0,1:-45").unwrap();
         assert_eq!((turn.angle_deg, turn.name()), (-45.0, "1,0,1_-45"));
-        for wrong in ["z", "z:", "w:90", "0,0,0:90", "z:NaN", "1,2:3", "z:1e9"] {
+        for wrong in ["z:0", "z", "z:", "w:90", "0,0,0:90", "z:NaN", "1,2:3", "z:1e9"] {
             assert!(Turn::read(wrong).is_err(), "{wrong}");
         }
         assert!(primitive("sphere:0.03").unwrap().is_ok());

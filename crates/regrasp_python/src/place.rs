@@ -59,7 +59,7 @@ pub fn place(py: Python<'_>, request: Request, options: Options) -> PyResult<(Ve
             packages: &options.resolve.packages,
         };
         let deadline = request.time_limit.map(|limit| Instant::now() + Duration::from_secs_f64(limit));
-        let found = watched(py, None, |cancelled, report| -> Result<Result<Vec<PathBuf>, Failure>, InputError> {
+        let found = watched(py, None, |cancelled, _| -> Result<Result<Vec<PathBuf>, Failure>, InputError> {
             let text = asked.scene()?;
             let draft = text.text(None);
             let loaded = load_scene_text(&request.output, draft.clone().into_bytes(), &options)
@@ -72,7 +72,7 @@ pub fn place(py: Python<'_>, request: Request, options: Options) -> PyResult<(Ve
             let settings = InHandSettings { n_threads: 1, ..InHandSettings::default() };
             let budget = Budget { max_work: request.max_work, deadline, improve_for: None, cancelled };
             let wanted = (request.seed, 1 + request.alternatives);
-            let places = match find_places(&loaded.view(), &queries, &settings, wanted, &budget, report) {
+            let places = match find_places(&loaded.view(), &queries, &settings, wanted, &budget, &|_| {}) {
                 Ok(found) => found.places,
                 Err(failure) => return Ok(Err(failure)),
             };

@@ -7,6 +7,7 @@ use crate::interrupt;
 use crate::load;
 use crate::outputs::{Output, Outputs, refuse_no_folder};
 use crate::pages;
+use crate::progress::PlaceLines;
 use crate::stop::Stop;
 use crate::talk::Talk;
 use crate::words::{counted, duration, grouped};
@@ -15,7 +16,7 @@ use regrasp::placing::{Asked, of_draft};
 use regrasp::plan::check::{CheckSettings, check};
 use regrasp::planners::FailureKind;
 use regrasp::planners::in_hand::placing::probe::Probe;
-use regrasp::planners::in_hand::placing::{Place, Places, place};
+use regrasp::planners::in_hand::placing::{Place, Places, Tried, place};
 use regrasp::robot::ResolveOptions;
 use regrasp::scene::{LoadedScene, load_scene_text};
 use regrasp::scene_text::Turn;
@@ -76,7 +77,9 @@ pub fn run(arguments: &args::Place, common: &Common, talk: &Talk) -> Result<(), 
     let budget = Budget { deadline, cancelled: Arc::clone(&cancelled), ..Budget::work(arguments.max_work) };
     let started = Instant::now();
     let wanted = if pictures.is_empty() { n_scenes } else { n_scenes.max(DRAWN) };
-    let found = place(&loaded.view(), &queries, &settings, (arguments.seed, wanted), &budget, &|_| {});
+    let lines = PlaceLines::new(talk);
+    let told = |tried: &Tried| lines.report(tried);
+    let found = place(&loaded.view(), &queries, &settings, (arguments.seed, wanted), &budget, &told);
     let found = found.map_err(|failure| match failure.kind {
         FailureKind::Interrupted => Stop::Interrupted,
         _ => Stop::NoPlan(Box::new(failure)),

@@ -10,11 +10,12 @@ use regrasp_plan::check::{CheckSettings, ViolationKind};
 use regrasp_plan::plan::{PoseData, SegmentKind};
 use regrasp_planners::in_hand::placing::samples::ContactSamples;
 use regrasp_planners::in_hand::placing::sizes::sizes;
-use regrasp_planners::in_hand::placing::{Places, place};
-use regrasp_planners::{FailureKind, InHandSettings, plan_in_hand};
+use regrasp_planners::in_hand::placing::{Places, Tried, place};
+use regrasp_planners::{FailureKind, InHandSettings, Progress, plan_in_hand};
 use regrasp_robot::import::LoadOptions;
 use regrasp_robot::inspect::TipReach;
 use regrasp_scene::{HandView, LoadedScene, load_scene_text};
+use std::sync::Mutex;
 
 /// A scene of a bundled hand with an object, whose start is open.
 fn scene(hand: &str, object: &str, start: &str, turn: &str) -> LoadedScene {
@@ -90,6 +91,26 @@ fn where_the_best_estimates_lead_to_no_turn_places_are_looked_for_elsewhere() {
         .unwrap_or_else(|failure| panic!("{failure}"));
     let report = loaded.judge(&query, &plan, &CheckSettings::default());
     assert!(report.accepted(), "{:?}", report.violations);
+}
+
+#[test]
+fn whoever_waits_for_a_place_hears_what_was_tried() {
+    let loaded = scene(WIDE, "sphere = { radius = 0.03 }", AUTO, TURN);
+    let heard = Mutex::new(Vec::new());
+    let told = |tried: &Tried| heard.lock().unwrap().push(tried.clone());
+    let settings = InHandSettings::default();
+    let found =
+        place(&loaded.view(), &[loaded.in_hand(3)], &settings, (3, 3), &Budget::unlimited(), &told).unwrap().tried;
+    let heard = heard.into_inner().unwrap();
+    assert!(heard.len() as u64 > found.probed && heard.windows(2).all(|pair| pair[0].work < pair[1].work));
+    // The last word is what was tried in all, but for how many poses turned out well.
+    let last = heard.last().unwrap();
+    assert_eq!(Tried { solved: 0, ..last.clone() }, Tried { solved: 0, ..found });
+    // So does who waits for a plan whose start is open: before the first search there are no nodes, but work.
+    let works = Mutex::new(Vec::new());
+    let listen = |progress: Progress| works.lock().unwrap().push((progress.nodes, progress.work));
+    plan_in_hand(&loaded.view(), &loaded.in_hand(3), &settings, 3, &Budget::work(3_000_000), &listen).unwrap();
+    assert!(works.into_inner().unwrap().iter().any(|&(nodes, work)| nodes == 0 && work > 0));
 }
 
 #[test]

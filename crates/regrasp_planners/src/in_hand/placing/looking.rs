@@ -33,6 +33,8 @@ pub struct Looks<'a> {
     pub tried: Tried,
     /// Poses given out so far: each has random numbers of its own.
     pub n_given: u64,
+    /// Hears what was tried so far.
+    pub told: &'a (dyn Fn(&Tried) + Sync),
 }
 
 /// What a look at a pose comes to.
@@ -76,6 +78,7 @@ impl Looks<'_> {
                     joints,
                 });
             }
+            (self.told)(&self.tried);
         }
         None
     }

@@ -40,7 +40,6 @@ use regrasp_base::{Budget, Interrupt, Rng};
 use regrasp_geometry::Pose;
 use regrasp_manipulation::failure::{Cause, Failure, FailureKind, NearestMiss};
 use regrasp_manipulation::model::Model;
-use regrasp_manipulation::progress::Progress;
 use regrasp_plan::plan::PoseData;
 use regrasp_robot::inspect::TipReach;
 use regrasp_scene::{HandView, InHandQuery};
@@ -98,14 +97,15 @@ pub struct Places {
 
 /// Looks for up to `n_wanted` start poses of the object of `view` for `queries`, which all leave it open.
 ///
-/// The answer depends on view, queries, settings and seed alone; a deadline may only cut. Errors: no pose with a grasp was found.
+/// The answer depends on view, queries, settings and seed alone; a deadline may only cut. `told` hears now and then what was tried so far, from
+/// the calling thread. Errors: no pose with a grasp was found.
 pub fn place(
     view: &HandView,
     queries: &[InHandQuery],
     settings: &InHandSettings,
     (seed, n_wanted): (u64, usize),
     budget: &Budget,
-    progress: &(dyn Fn(Progress) + Sync),
+    told: &(dyn Fn(&Tried) + Sync),
 ) -> Result<Places, Failure> {
     settings.validate().map_err(|problem| Failure::of_settings(&problem))?;
     Failure::refuse_many_fingers(view)?;
@@ -134,11 +134,11 @@ pub fn place(
     let estimated = estimated(&asked, &proposals, &outlook, &mut rng, &mut tried);
 
     let winner = AtomicUsize::new(usize::MAX);
-    let context = Context { model, settings, seed, budget, winner: &winner, progress };
+    let context = Context { model, settings, seed, budget, winner: &winner, progress: &|_| {} };
     let tally = Tally::default();
-    let mut looks = Looks { context, asked: &asked, moves, places: Vec::new(), tally, tried, n_given: 0 };
+    let mut looks = Looks { context, asked: &asked, moves, places: Vec::new(), tally, tried, n_given: 0, told };
     let mut cut = looks.look_at(&estimated.best);
-    let searches = ShortSearches { view, queries, settings, seed, budget };
+    let searches = ShortSearches { view, queries, settings, seed, budget, told };
     searches.first(&mut looks.places, &mut looks.tried)?;
     if looks.tried.solved == 0 && cut.is_none() {
         cut = looks.widen(&estimated, &proposals, &outlook, &mut rng);

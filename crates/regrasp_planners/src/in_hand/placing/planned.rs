@@ -1,7 +1,7 @@
 //! Plans whose start pose the planner chooses: from the best places in turn, with a slice of the work each, then from the best one with
 //! all that is left.
 
-use super::place;
+use super::{Tried, place};
 use crate::in_hand::plan_in_hand;
 use crate::settings::InHandSettings;
 use regrasp_base::Budget;
@@ -25,7 +25,9 @@ pub fn plan_placed(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Plan, Failure> {
     let half = Budget { max_work: budget.max_work / 2, ..budget.clone() };
-    let found = place(view, std::slice::from_ref(query), settings, (seed, TRIED), &half, progress)?;
+    let angle_left = query.poses().windows(2).map(|leg| leg[0].rotation.angle_to(&leg[1].rotation)).sum();
+    let told = |tried: &Tried| progress(Progress { nodes: 0, work: tried.work, restarts: 0, angle_left });
+    let found = place(view, std::slice::from_ref(query), settings, (seed, TRIED), &half, &told)?;
     let mut spent = found.tried.work;
     let (most, share) = SLICE;
     let slice = most.min(budget.max_work / share);

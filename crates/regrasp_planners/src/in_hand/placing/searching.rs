@@ -31,6 +31,8 @@ pub struct ShortSearches<'a> {
     pub seed: u64,
     /// The caller's limits.
     pub budget: &'a Budget,
+    /// Hears what was tried so far.
+    pub told: &'a (dyn Fn(&Tried) + Sync),
 }
 
 impl ShortSearches<'_> {
@@ -59,7 +61,10 @@ impl ShortSearches<'_> {
                     false => place.probes.iter_mut().zip(probes).for_each(|(known, new)| known.add(new)),
                 }
                 n_searched += 1;
+                tried.probed += u64::from(round == 0);
+                tried.solved += u64::from(round == 0 && place.is_solved());
             }
+            (self.told)(tried);
         }
         Ok(n_searched)
     }
@@ -72,7 +77,6 @@ impl ShortSearches<'_> {
             let mut batch: Vec<&mut Place> =
                 places.iter_mut().filter(|place| place.probes.is_empty()).take(BATCH).collect();
             let n_searched = self.search(&mut batch, 0, tried)?;
-            tried.probed += n_searched as u64;
             if n_searched == 0 || n_solved(places) >= ENOUGH {
                 break;
             }
