@@ -343,3 +343,18 @@ def test_one_quaternion_is_computed_as_many_are() -> None:
         one_by_one = rotation_matrices(a / np.linalg.norm(a)) @ rotation_matrices(b / np.linalg.norm(b))
         assert np.allclose(ab, one_by_one, atol=1e-12)
     assert (quat_product(quats[0][0], quats[1]) == quat_product(np.tile(quats[0][0], (50, 1)), quats[1])).all()
+
+
+def test_hands_whose_root_link_is_called_world_are_replayed(tmp_path: Path) -> None:
+    """As in many URDFs. MuJoCo has a body of that name too."""
+    hand = SCENES.parent / "assets/hands/wide_four_finger"
+    for name in ("hand.toml", "hand.urdf"):
+        (tmp_path / name).write_text((hand / name).read_text().replace('"palm"', '"world"'))
+    text = (SCENES / "sphere_90x.toml").read_text()
+    scene = tmp_path / "scene.toml"
+    scene.write_text(text.replace("../assets/hands/wide_four_finger/hand.toml", "hand.toml"))
+    plan = regrasp.plan(scene, seed=2)
+    assert isinstance(plan, regrasp.Plan), plan
+    model = mujoco.MjModel.from_xml_string(regrasp.export_mjcf(plan, regrasp.load_scene(scene)))
+    names = [model.body(index).name for index in range(model.nbody)]
+    assert names.count("world") == 1 and "world_" in names

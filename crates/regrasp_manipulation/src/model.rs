@@ -12,6 +12,7 @@ use regrasp_geometry::surface::SurfacePoint;
 use regrasp_geometry::{Point, Pose, Shape};
 use regrasp_grasp::{Contact, ContactModel, GraspFrame, Grip, closure};
 use regrasp_robot::kinematics::body_frame::BodyFrame;
+use regrasp_robot::kinematics::chain::Chain;
 use regrasp_robot::kinematics::finger_ik::FingerIk;
 use regrasp_robot::kinematics::motion_bound::MotionBound;
 use regrasp_robot::tip::{CurvedTip, Pad, is_same_surface};
@@ -31,6 +32,8 @@ pub struct FingerModel<'a> {
     pub settle_radius: f64,
     /// Where the tip may touch; anywhere without one.
     pub pad: Option<&'a Pad>,
+    /// Distance that its joints keep from their limits: that of the settings, or of short ranges [`SHARE_OF_RANGE`].
+    pub limit_margin: f64,
     /// Its last link at rest, in the world.
     pub link_at_rest: BodyFrame,
     /// What the tip transmits where it touches.
@@ -226,6 +229,7 @@ impl<'a> Model<'a> {
                 curved: finger.tip.curved(),
                 settle_radius: finger.tip.curved().map_or(finger.tip.radius(), |tip| tip.settle_radius()),
                 pad: finger.tip.pad.as_ref(),
+                limit_margin: limit_margin(&finger.chain, settings.limit_margin),
                 link_at_rest: finger.chain.last_frame(&finger.rest),
                 contact: finger.tip.contact,
                 tip_bound: MotionBound::new(
@@ -505,6 +509,15 @@ fn pair_of(
         _ => None,
     };
     Some(Pair { a, b, tip_of })
+}
+
+/// Distance from their limits that joints keep at most, as a share of their range: slides of a few millimetres would keep from moving at all.
+const SHARE_OF_RANGE: f64 = 0.05;
+
+/// The distance from their limits that the joints of `chain` keep where `asked` is asked.
+fn limit_margin(chain: &Chain, asked: f64) -> f64 {
+    let ranges = chain.lower.iter().zip(&chain.upper).map(|(lower, upper)| upper - lower);
+    ranges.map(|range| SHARE_OF_RANGE * range).fold(asked, f64::min)
 }
 
 /// The fingers with what their tips transmit.

@@ -320,6 +320,10 @@ fn joints_of_no_finger_stand_where_the_file_says_or_as_near_to_zero_as_they_can(
     let loaded = load(folder.path(), &parts.concat(), &text, "hand.toml", None).unwrap();
     let found: Vec<(String, f64)> = loaded.hand.held_joints().into_iter().collect();
     assert_eq!(found, [("lamp".to_owned(), 0.2), ("wrist".to_owned(), -0.25)]);
+    let held: Vec<&String> = loaded.notes.iter().filter(|note| note.contains("held at")).collect();
+    let said =
+        ["joint \"wrist\" belongs to no finger; held at -0.25", "joint \"lamp\" belongs to no finger; held at 0.2"];
+    assert_eq!(held, said);
     // The boxes are where those positions put them, by hand.
     for (name, angle) in found {
         let link = loaded.hand.robot.link_named(&format!("{name}_link")).unwrap();
@@ -519,4 +523,57 @@ fn links_of_a_finger_that_are_always_near_each_other_are_not_tested() {
     assert_eq!(read.hand.allowed_pairs, loaded.hand.allowed_pairs);
     let loaded = guess(&(phalanges("i", 0.03) + &phalanges("t", 0.03)), None).unwrap();
     assert!(!may_touch(&loaded, ["i_a", "i_c"]) && !loaded.notes.iter().any(|text| text.starts_with(note)));
+}
+
+/// A plate fixed to `parent`, at height `z`, in metres.
+fn plate(name: &str, parent: &str, z: f64) -> String {
+    format!(
+        r#"<link name="{name}"><collision><geometry><box size="0.1 0.1 0.02"/></geometry></collision></link>
+<joint name="{name}_joint" type="fixed"><parent link="{parent}"/><child link="{name}"/><origin xyz="0 0 {z}"/></joint>
+"#
+    )
+}
+
+/// Links that one joint connects meet there. Links with a held joint or a body without geometry between them may meet or not.
+#[test]
+fn links_across_held_joints_and_bare_bodies_are_tested_unless_they_always_meet() {
+    let may_touch = |loaded: &LoadedHand, [a, b]: [&str; 2]| {
+        let link = |name: &str| loaded.hand.robot.link_named(name).unwrap();
+        loaded.hand.may_touch(link(a), link(b))
+    };
+    let note = "links with only bodies without collision geometry, or held joints, between them";
+    // A knuckle without geometry.
+    let of_knuckle = |z| plate("palm", "root", z) + &turning("knuckle", "root") + &finger("t", "knuckle");
+    // Where its two joints are in one place they are as one.
+    let on_the_spot = of_knuckle(-0.05).replace("0.03 0 0", "0 0 0") + &finger("i", "root");
+    assert!(may_touch(&guess(&on_the_spot, None).unwrap(), ["palm", "t_a"]));
+    let apart = guess(&(of_knuckle(-0.05) + &finger("i", "root")), None).unwrap();
+    assert!(!may_touch(&apart, ["palm", "t_a"]) && !may_touch(&apart, ["palm", "t_b"]));
+    assert!(may_touch(&apart, ["palm", "i_a"]) && may_touch(&apart, ["t_a", "t_b"]));
+    assert!(!apart.notes.iter().any(|text| text.starts_with(note)), "{:?}", apart.notes);
+    let meeting = guess(&(of_knuckle(0.0) + &finger("i", "root")), None).unwrap();
+    assert!(may_touch(&meeting, ["palm", "t_a"]) && !may_touch(&meeting, ["palm", "t_b"]));
+    let said: Vec<&String> = meeting.notes.iter().filter(|text| text.starts_with(note)).collect();
+    assert!(said.len() == 1 && said[0].ends_with(": \"palm\" and \"t_a\""), "{:?}", meeting.notes);
+    // A fold of the palm that is held.
+    let parts = [
+        plate("palm", "root", -0.05),
+        finger("i", "root"),
+        finger("m", "root"),
+        turning("fold", "root"),
+        plate("flap", "fold", -0.08),
+        finger("r", "fold"),
+        finger("l", "fold"),
+    ];
+    let folded = guess(&parts.concat(), None).unwrap();
+    for (pair, allowed) in [("flap r_a", true), ("palm i_a", true), ("palm r_a", false), ("flap i_a", false)] {
+        let (a, b) = pair.split_once(' ').unwrap();
+        assert_eq!(may_touch(&folded, [a, b]), allowed, "{pair}");
+    }
+}
+
+#[test]
+fn a_mesh_that_is_far_too_large_is_not_left_out_as_a_volume_around_the_fingers() {
+    let loaded = guess(&(box_around(40.0) + &finger("i", "root") + &finger("t", "root")), None).unwrap();
+    assert_eq!((loaded.hand.without_geometry.len(), loaded.hand.palm.len()), (0, 1));
 }

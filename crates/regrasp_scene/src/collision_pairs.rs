@@ -1,7 +1,7 @@
 //! Who may not touch whom around one hand: every pair that its planner has to keep apart.
 //!
-//! Left out: pairs that the hand allows (`Hand::may_touch`), neighbours in a finger (bodies joined by one joint, and the
-//! palm with every first body), and pairs that never move against each other (palm and obstacles).
+//! Left out: pairs that the hand allows (`Hand::may_touch`: the palm and first bodies that stand on it are among them), neighbours in a finger
+//! (bodies joined by one joint), and pairs that never move against each other (palm and obstacles).
 
 use crate::hand_view::HandView;
 use regrasp_robot::{FingerId, Hand, LinkId};
@@ -62,9 +62,7 @@ pub fn collision_pairs(view: &HandView) -> CollisionPairs {
             }
         }
         let palm = hand.palm.iter().enumerate().filter(|(_, palm)| !hand.may_touch(link_of(hand, a), palm.link));
-        if shape_of(hand, a).body > 0 {
-            pairs.finger_palm.extend(palm.map(|(index, _)| (a, index)));
-        }
+        pairs.finger_palm.extend(palm.map(|(index, _)| (a, index)));
         pairs.finger_obstacle.extend((0..view.obstacles.len()).map(|obstacle| (a, obstacle)));
     }
     pairs

@@ -206,7 +206,8 @@ class Constraints:
                 f'{-its / own:.4g} * "{leader.name}": written as a coupling'
             )
             return True
-        if follower.coupling is None and _pulls(model, tendon):
+        leads = leader.coupling is not None and leader.coupling.leader == follower.name
+        if follower.coupling is None and not leads and _pulls(model, tendon):
             source.notes.append(
                 f'one actuator pulls joints "{leader.name}" and "{follower.name}" by tendon "{name}". Where one follows the other, '
                 f'say so: --couple "{follower.name}={leader.name}"'

@@ -7,7 +7,7 @@ use super::solid::ObjectSolid;
 use super::tip::{own_tip, tip_name};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_robot::tip::is_same_surface;
-use regrasp_robot::{Hand, JointId, LinkId};
+use regrasp_robot::{Hand, JointId, LinkId, Robot};
 use regrasp_scene::{Manipulation, Obstacle, Scene};
 use std::slice;
 
@@ -98,6 +98,17 @@ impl Names {
     }
 }
 
+/// The body of a link that keeps its name. MuJoCo has a body of its own that is called `world`, as the root link of many a URDF is.
+pub(super) fn body_name(robot: &Robot, link: LinkId) -> String {
+    let mut name = robot.links[link.0].name.clone();
+    if name == "world" {
+        while robot.link_named(&name).is_some() {
+            name.push('_');
+        }
+    }
+    name
+}
+
 impl HandNames {
     fn of(hand: &Hand, prefix: String) -> Self {
         let mut used = vec![0; hand.robot.links.len()];
@@ -135,7 +146,10 @@ impl HandNames {
 
     /// The body of a link.
     pub fn link(&self, hand: &Hand, link: LinkId) -> String {
-        self.named(&hand.robot.links[link.0].name)
+        match self.prefix.is_empty() {
+            true => body_name(&hand.robot, link),
+            false => self.named(&hand.robot.links[link.0].name),
+        }
     }
 
     /// A joint, and its motor or servo.

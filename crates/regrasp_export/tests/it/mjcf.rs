@@ -85,3 +85,17 @@ fn a_plan_for_another_hand_is_refused() {
     plan.fingers.swap(0, 1);
     assert!(matches!(to_mjcf(&LOADED.manipulation(), &plan), Err(MjcfError::AnotherHand { what: "fingers", .. })));
 }
+
+#[test]
+fn no_link_is_called_as_the_body_of_mujoco_that_carries_all() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sphere_90x.toml");
+    let mut loaded = regrasp_scene::load_scene(&path, &Default::default()).expect("a bundled scene");
+    let hand = &mut loaded.scene.hands[0].hand;
+    let (base, n_links) = (hand.base.0, hand.robot.links.len());
+    let links = &mut std::sync::Arc::make_mut(&mut hand.robot).links;
+    links[base].name = "world".into();
+    links[(base + 1) % n_links].name = "world_".into();
+    let xml = to_mjcf(&loaded.manipulation(), &PLAN).expect("the same joints").xml;
+    let bodies = values(&xml, "body", "name");
+    assert!(bodies.contains(&"world__") && bodies.contains(&"world_") && !bodies.contains(&"world"), "{bodies:?}");
+}

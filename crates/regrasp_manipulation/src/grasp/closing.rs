@@ -43,7 +43,7 @@ pub fn draw_touch(
         let touch = touch_on_way(model, finger, &hand_from_object, &open, &closed);
         let Some((contact, joints)) = touch else { continue };
         let chain = model.fingers[finger].ik.chain();
-        if chain.within_limits(&joints, model.settings.limit_margin)
+        if chain.within_limits(&joints, model.fingers[finger].limit_margin)
             && is_usable(workspace, finger, &contact, &joints, world_from_object)
         {
             return Some((contact, joints));
@@ -59,7 +59,7 @@ fn draw_line(model: &Model, finger: usize, world_from_object: &Placement, rng: &
     let chain = ik.chain();
     let n = chain.n_coordinates();
     let range = |k: usize| {
-        let margin = model.settings.limit_margin;
+        let margin = model.fingers[finger].limit_margin;
         let (low, high) = (chain.lower[k].max(-ENDLESS) + margin, chain.upper[k].min(ENDLESS) - margin);
         (low, high.max(low))
     };

@@ -16,7 +16,7 @@ pub fn ik_settings(model: &Model, finger: usize, normal_in_world: UnitVector) ->
         weight: PREFERENCE_WEIGHT,
         damping: 0.0,
     });
-    IkSettings { limit_margin: model.settings.limit_margin, preference, max_step: model.settings.joint_step }
+    IkSettings { limit_margin: model.fingers[finger].limit_margin, preference, max_step: model.settings.joint_step }
 }
 
 /// Joints of `finger` that keep `contact` with the object at `world_from_object`, near `seed`.

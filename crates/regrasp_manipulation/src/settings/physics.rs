@@ -39,7 +39,7 @@ pub struct PhysicsSettings {
     /// How far the tip link of a holding finger may press into the object in the model, in metres. By hand: well below
     /// the contact tolerance of 0.5 mm.
     pub contact_allowance: f64,
-    /// Distance that joints keep from their limits. Origin: measurements on a prototype.
+    /// Distance that joints keep from their limits, but at most a twentieth of the shortest range of a joint of the finger. Origin: measurements on a prototype.
     pub limit_margin: f64,
     /// Largest change of a joint in one step that counts as continuous. Origin: measurements on a prototype.
     pub joint_step: f64,

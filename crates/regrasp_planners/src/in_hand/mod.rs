@@ -166,7 +166,7 @@ fn plan_with(
     let goal_grasp = given_grasp(&model, End::Goal, &goal_pose, &query.goal_grasp, &mut rng)?;
 
     let legs = Legs { poses: &poses, start_grasp: start_grasp.as_ref(), goal_grasp: goal_grasp.as_ref() };
-    let (base_work, max_work) = work_limits(&model, settings, &legs, budget);
+    let (base_work, max_work) = work_limits(&model, settings, (&legs, query.stays()), budget);
     let found = run_attempts(settings.n_threads, base_work, max_work, |index, work, winner| {
         let context = Context { model: &model, settings, seed, budget, winner, progress };
         let mut search = Search::new(context, [start_pose, goal_pose], index, work);
@@ -203,14 +203,14 @@ fn plan_with(
     }
 }
 
-/// Work of the first attempt, and of all together.
-fn work_limits(model: &Model, settings: &InHandSettings, legs: &Legs, budget: &Budget) -> (u64, u64) {
+/// Work of the first attempt, and of all together; a query that `stays` is one for a grasp.
+fn work_limits(model: &Model, settings: &InHandSettings, (legs, stays): (&Legs, bool), budget: &Budget) -> (u64, u64) {
     let base_work = match settings.method {
         Method::Gait => settings.search.restart_work.saturating_mul(legs.n_legs() as u64),
         Method::Visibility | Method::Classic => budget.max_work,
     };
-    // A hand that cannot change its grasp has transfers only: what there is to find is found soon.
-    (base_work, if model.may_release { budget.max_work } else { budget.max_work.min(TRANSFERS_WORK) })
+    // A hand that cannot change its grasp has transfers only: what there is to find is found soon. It may hold as long as it likes.
+    (base_work, if model.may_release || stays { budget.max_work } else { budget.max_work.min(TRANSFERS_WORK) })
 }
 
 /// Work after which a hand that cannot change its grasp is refused: some thousand grasps and transfers. By hand.

@@ -12,6 +12,7 @@ use super::spec::{Carried, FingerSpec, HandSpec, RigidBody, TipSpec};
 use super::tip_split;
 use crate::coupling::Coupling;
 use crate::hand::{Finger, FingerShape, Hand, MAX_FINGERS, PalmShape};
+use crate::inspect::crowded::{inseparable_note, inseparable_pairs};
 use crate::robot::{JointId, JointKind, LinkId, Robot};
 use crate::tip::{Pad, Tip, TipEllipsoid, TipShape};
 use regrasp_base::diagnostic::Diagnostics;
@@ -50,7 +51,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
     // An arm that carries the hand moves, and is no part of it.
     let above = match spec.mount {
         Some(_) => BTreeMap::new(),
-        None => above_base(robot, &carried, &owner, file, &mut found),
+        None => above_base((robot, spec), &carried, &owner, file, &mut found),
     };
     let of_palm =
         carried.iter().filter(|(_, at)| at.body == RigidBody::Palm).map(|(&link, at)| (link, at.body_from_link));
@@ -59,8 +60,9 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
         let shapes = hulls.of_link(link, &base_from_link, &mut found);
         palm.extend(shapes.into_iter().map(|placed| PalmShape { link, placed }));
     }
+    let neighbours = neighbours(robot, &carried, &moving);
     let mut allowed_pairs = spec.allow.clone();
-    allowed_pairs.extend(adjacent_pairs(robot, &carried, &moving));
+    allowed_pairs.extend(neighbours.adjacent);
     if !above.is_empty() {
         let base = &robot.links[spec.base.0].name;
         let names: Vec<String> = above.keys().map(|link| format!("\"{}\"", robot.links[link.0].name)).collect();
@@ -78,19 +80,22 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
     notes.extend(drawn_only_note(robot, spec, carried.keys().copied()));
     let held =
         spec.held.iter().filter(|(joint, _)| !owner.contains_key(joint)).map(|(&joint, &at)| (joint, at)).collect();
-    found.into_result((
-        Hand {
-            robot: robot.clone(),
-            base: spec.base,
-            fingers,
-            palm,
-            allowed_pairs,
-            held,
-            without_geometry: spec.without_geometry.clone(),
-            ties: Vec::new(),
-        },
-        notes,
-    ))
+    let mut hand = Hand {
+        robot: robot.clone(),
+        base: spec.base,
+        fingers,
+        palm,
+        allowed_pairs,
+        held,
+        without_geometry: spec.without_geometry.clone(),
+        ties: Vec::new(),
+    };
+    let inseparable = inseparable_pairs(&hand, &neighbours.across);
+    if !inseparable.is_empty() {
+        notes.push(inseparable_note(robot, &inseparable));
+        hand.allowed_pairs.extend(inseparable);
+    }
+    found.into_result((hand, notes))
 }
 
 /// Links that are named at most.
@@ -211,7 +216,7 @@ fn carry(
                     Carried { body: RigidBody::Finger { finger, body }, body_from_link: Pose::identity() }
                 }
                 None => {
-                    let held = held_at(robot, id, owner, file, found, notes);
+                    let held = held_at((robot, spec), id, owner, file, found, notes);
                     let body_from_link = at.body_from_link * joint.parent_from_joint * held;
                     Carried { body: at.body, body_from_link }
                 }
@@ -225,7 +230,7 @@ fn carry(
 
 /// Poses in the base frame of the links that no link in `carried` carries: those above the base, and their other branches.
 fn above_base(
-    robot: &Robot,
+    (robot, spec): (&Robot, &HandSpec),
     carried: &BTreeMap<LinkId, Carried>,
     owner: &BTreeMap<JointId, (usize, usize)>,
     file: &Path,
@@ -247,7 +252,7 @@ fn above_base(
                 continue;
             }
             let parent_from_child =
-                robot.joints[id.0].parent_from_joint * held_at(robot, id, owner, file, found, &mut notes);
+                robot.joints[id.0].parent_from_joint * held_at((robot, spec), id, owner, file, found, &mut notes);
             let is_up = Some(id) == robot.links[link.0].parent_joint;
             let link_from_next = if is_up { parent_from_child.inverse() } else { parent_from_child };
             above.insert(next, base_from_link * link_from_next);
@@ -259,7 +264,7 @@ fn above_base(
 
 /// The motion of a joint that belongs to no finger, at the position where it is held.
 fn held_at(
-    robot: &Robot,
+    (robot, spec): (&Robot, &HandSpec),
     id: JointId,
     owner: &BTreeMap<JointId, (usize, usize)>,
     file: &Path,
@@ -288,7 +293,9 @@ fn held_at(
         Some(coupling) => coupling.position(|leader| robot.joints[leader.0].nearest_to_zero()),
         None => joint.nearest_to_zero(),
     };
-    notes.push(format!("joint \"{}\" belongs to no finger; held at {position}", joint.name));
+    // Where the hand file holds a joint is its zero here.
+    let told = spec.held.get(&id).map_or(position, |held| held + position);
+    notes.push(format!("joint \"{}\" belongs to no finger; held at {told}", joint.name));
     joint.motion(position)
 }
 
@@ -360,30 +367,62 @@ fn make_finger(
     Some(Finger::new(spec.name.clone(), chain, tip, shapes, rest))
 }
 
-/// Pairs of links of one body, and of bodies that follow each other with nothing but bodies without shapes between.
-fn adjacent_pairs(
-    robot: &Robot,
-    carried: &BTreeMap<LinkId, Carried>,
-    moving: &[Vec<JointId>],
-) -> BTreeSet<(LinkId, LinkId)> {
+/// Distance within which joints are in one place, in metres.
+const ONE_PLACE: f64 = 0.001;
+
+/// Pairs of links that are next to each other.
+#[derive(Default)]
+struct Neighbours {
+    /// Of one body, or of two that one joint connects, or several in one place: they meet there.
+    adjacent: BTreeSet<(LinkId, LinkId)>,
+    /// With bodies without shapes between them, or joints that are held: they may meet or not.
+    across: BTreeSet<(LinkId, LinkId)>,
+}
+
+/// The neighbours among the links that have collision geometry.
+fn neighbours(robot: &Robot, carried: &BTreeMap<LinkId, Carried>, moving: &[Vec<JointId>]) -> Neighbours {
     let mut links_of: BTreeMap<RigidBody, Vec<LinkId>> = BTreeMap::new();
     for (&link, at) in carried.iter().filter(|(link, _)| !robot.links[link.0].collision.is_empty()) {
         links_of.entry(at.body).or_default().push(link);
     }
-    let mut pairs = BTreeSet::new();
-    let mut add = |a: &[LinkId], b: &[LinkId]| {
-        pairs.extend(a.iter().flat_map(|&x| b.iter().map(move |&y| (x.min(y), x.max(y)))).filter(|(x, y)| x != y));
+    // Links with the same one are joined by fixed joints.
+    let rigid_root = |link: LinkId| {
+        let mut at = link;
+        while let Some(joint) = robot.links[at.0].parent_joint.map(|joint| &robot.joints[joint.0])
+            && joint.kind == JointKind::Fixed
+        {
+            at = joint.parent;
+        }
+        at
     };
+    let ordered = |a: LinkId, b: LinkId| (a.min(b), a.max(b));
+    let offset = |joint: JointId| {
+        let joint = &robot.joints[joint.0];
+        (robot.fixed_pose_in_body(joint.parent) * joint.parent_from_joint).translation.vector.norm()
+    };
+    let mut found = Neighbours::default();
     for links in links_of.values() {
-        add(links, links);
+        let pairs = links.iter().enumerate().flat_map(|(k, &a)| links[..k].iter().map(move |&b| ordered(a, b)));
+        found.adjacent.extend(pairs);
     }
     for (finger, joints) in moving.iter().enumerate() {
+        let root = joints.first().map(|first| rigid_root(robot.joints[first.0].parent));
         let bodies = (0..joints.len()).map(|body| RigidBody::Finger { finger, body });
-        let with_shapes: Vec<&Vec<LinkId>> =
-            std::iter::once(RigidBody::Palm).chain(bodies).filter_map(|body| links_of.get(&body)).collect();
+        let with_shapes: Vec<(usize, &Vec<LinkId>)> = std::iter::once(RigidBody::Palm)
+            .chain(bodies)
+            .enumerate()
+            .filter_map(|(depth, body)| Some((depth, links_of.get(&body)?)))
+            .collect();
         for pair in with_shapes.windows(2) {
-            add(pair[0], pair[1]);
+            let [(depth, above), (next, below)] = [pair[0], pair[1]];
+            // Joints in one place, as those of a knuckle that turns both ways, are as one.
+            let is_one_place = joints[depth..next].iter().skip(1).all(|joint| offset(*joint) < ONE_PLACE);
+            for &a in above {
+                let is_held_off = depth == 0 && Some(rigid_root(a)) != root;
+                let kind = if is_held_off || !is_one_place { &mut found.across } else { &mut found.adjacent };
+                kind.extend(below.iter().map(|&b| ordered(a, b)));
+            }
         }
     }
-    pairs
+    found
 }

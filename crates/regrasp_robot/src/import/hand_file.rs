@@ -14,6 +14,7 @@ use super::ties;
 use super::urdf::{LoadedRobot, load_robot};
 use crate::contact_model::{self, ContactModel};
 use crate::hand::{Hand, MAX_FINGERS};
+use crate::inspect::enclosing::LARGEST_RADIUS;
 use crate::inspect::guess::leave_out_what_blocks;
 use crate::robot::{JointId, LinkId, Robot};
 use nalgebra::{Quaternion, UnitQuaternion};
@@ -22,7 +23,8 @@ use regrasp_base::diagnostic::number;
 use regrasp_base::toml_table::{Codes, Entry, Found, Table};
 use regrasp_base::{Diagnostic, InputError, Place, files};
 use regrasp_geometry::frame::direction;
-use regrasp_geometry::{Point, Vector};
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{Point, Shape, Vector};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -111,7 +113,7 @@ fn made(parts: &HandParts, path: &Path, options: &LoadOptions) -> Result<(Hand, 
     // Joints of fingers move: a position given to them says nothing.
     let moving = shared_motors::moving_joints(&parts.robot, &spec);
     spec.held.retain(|joint, _| !moving.contains(joint));
-    let robot = shared_motors::with_held_at_zero(&parts.robot, &spec, &mut notes);
+    let robot = shared_motors::with_held_at_zero(&parts.robot, &spec);
     let (robot, ties) = ties::untie(&robot, &spec, &mut notes);
     let (hand, more) = assemble(&Arc::new(robot), &spec, path)?;
     let mut hand = Hand { ties, ..hand };
@@ -176,8 +178,22 @@ pub(super) fn refuse_wrong_unit(hand: &Hand, path: &Path) -> Result<(), InputErr
         format!("the joints and tips of the hand are spread over {} m", shown_span(span)),
     )
     .expected(format!("a hand in metres; this one {guess}"))
-    .fix(format!("multiply every length of the URDF by {factor}"))
+    .fix(match large_tip_mesh(hand).filter(|_| span > 5.0) {
+        Some(link) => {
+            format!("scale the collision mesh of link \"{link}\": <mesh filename=\"...\" scale=\"0.001 0.001 0.001\"/>")
+        }
+        None => format!("multiply every length of the URDF by {factor}"),
+    })
     .into())
+}
+
+/// The first tip link with a mesh that cannot be in metres.
+fn large_tip_mesh(hand: &Hand) -> Option<&str> {
+    let links = hand.fingers.iter().map(|finger| &hand.robot.links[finger.tip.link.0]);
+    let is_large = |placed: &PlacedShape| {
+        matches!(placed.shape, Shape::Mesh(_)) && placed.shape.bounding_sphere().1 > LARGEST_RADIUS
+    };
+    links.into_iter().find(|link| link.collision.iter().any(is_large)).map(|link| link.name.as_str())
 }
 
 /// Metres with four decimals, where they say something.

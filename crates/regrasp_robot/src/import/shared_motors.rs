@@ -84,11 +84,10 @@ pub(super) fn moving_joints(robot: &Robot, spec: &HandSpec) -> BTreeSet<JointId>
 
 /// `robot` with the joints that `spec` holds somewhere at their zero: whoever holds joints of no finger as near to zero as they go has them
 /// there. Followers stay where their couplings have them.
-pub(super) fn with_held_at_zero(robot: &Robot, spec: &HandSpec, notes: &mut Vec<String>) -> Robot {
+pub(super) fn with_held_at_zero(robot: &Robot, spec: &HandSpec) -> Robot {
     let mut moved = robot.clone();
     for (&id, &position) in &spec.held {
         let joint = &mut moved.joints[id.0];
-        notes.push(format!("joint \"{}\" is held at {position}, which counts as its zero", joint.name));
         joint.parent_from_joint *= joint.motion(position);
         if let Some(limits) = &mut joint.limits {
             limits.lower -= position;

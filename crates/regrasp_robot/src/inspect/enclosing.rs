@@ -10,13 +10,20 @@ use std::collections::BTreeSet;
 /// Postures that are looked at.
 const POSTURES: usize = 100;
 
+/// Radius of the ball around geometry that can be meant as it is, in metres: larger is a mesh in millimetres.
+pub(crate) const LARGEST_RADIUS: f64 = 1.5;
+
 /// Links of the palm, other than the base link, that touch the tips of more than half the fingers in every posture.
 ///
-/// What a hand really has lets its fingertips away, or the hand would never hold anything with them.
+/// What a hand really has lets its fingertips away, or the hand would never hold anything with them. Meshes that are far too large are another
+/// matter: nobody wants those left out.
 pub(crate) fn enclosing_links(hand: &Hand) -> BTreeSet<LinkId> {
     let touch = Touch::new(hand);
     let mut enclosing: BTreeSet<LinkId> =
         hand.palm.iter().map(|shape| shape.link).filter(|&link| link != hand.base).collect();
+    for shape in hand.palm.iter().filter(|shape| shape.placed.shape.bounding_sphere().1 > LARGEST_RADIUS) {
+        enclosing.remove(&shape.link);
+    }
     let tips: BTreeSet<LinkId> = hand.fingers.iter().map(|finger| finger.tip.link).collect();
     let mut rng = Rng::keyed(0, "enclosing", 0);
     for _ in 0..POSTURES {

@@ -92,14 +92,18 @@ impl<'h> Touch<'h> {
         blocked
     }
 
-    /// Per pair, whether it is of one finger and nearer than `distance` in `posture`.
-    pub fn near_in_fingers(&self, posture: &[Vec<f64>], distance: f64) -> Vec<bool> {
-        let at = self.placed(posture);
+    /// Per pair, whether it is of one finger.
+    pub fn of_one_finger(&self) -> Vec<bool> {
         let finger = |shape: usize| self.shapes[shape].body.map(|(finger, _)| finger);
-        let is_near = |pair: &(usize, usize)| {
-            finger(pair.0).is_some() && finger(pair.0) == finger(pair.1) && self.shapes_are_within(&at, pair, distance)
-        };
-        self.shape_pairs.iter().map(|pairs| pairs.iter().any(is_near)).collect()
+        let is_of_one = |pair: &(usize, usize)| finger(pair.0).is_some() && finger(pair.0) == finger(pair.1);
+        self.shape_pairs.iter().map(|pairs| pairs.first().is_some_and(is_of_one)).collect()
+    }
+
+    /// Per pair, whether it is one of those `asked` for, and nearer than `distance` in `posture`.
+    pub fn near(&self, asked: &[bool], posture: &[Vec<f64>], distance: f64) -> Vec<bool> {
+        let at = self.placed(posture);
+        let is_near = |pair: &(usize, usize)| self.shapes_are_within(&at, pair, distance);
+        self.shape_pairs.iter().zip(asked).map(|(pairs, asked)| *asked && pairs.iter().any(is_near)).collect()
     }
 
     /// Where every shape is, and the centre of its bounding ball.

@@ -15,6 +15,7 @@ use super::Mjcf;
 use super::geom::{Geom, Look, Weight, is_hollowed, open_body, write_geom, write_inertial, write_mesh};
 use super::inertia::{self, Inertial};
 use super::model::hard_stops;
+use super::names::body_name;
 use super::solid::ObjectSolid;
 use super::tip::own_tip;
 use super::xml::{Xml, numbers};
@@ -259,7 +260,7 @@ impl RobotModel<'_> {
     /// A link and everything that it carries. `joint` is what carries it.
     fn write_link(&mut self, xml: &mut Xml, link: LinkId, parent_from_link: &Pose, joint: Option<usize>) {
         let robot = &self.robot.robot;
-        open_body(xml, robot.links[link.0].name.clone(), parent_from_link, Weight::Compensated);
+        open_body(xml, body_name(robot, link), parent_from_link, Weight::Compensated);
         if let Some(id) = joint.filter(|id| robot.joints[*id].moves()) {
             self.write_joint(xml, id);
             self.order.push(id);

@@ -72,7 +72,7 @@ fn best_of(
     let chain = model.fingers[finger].ik.chain();
     postures.push(model.view.hand.fingers[finger].rest.iter().copied().collect());
     for _ in 0..DRAWN {
-        let margin = model.settings.limit_margin;
+        let margin = model.fingers[finger].limit_margin;
         let limits = chain.lower.iter().zip(&chain.upper);
         let drawn: Coordinates =
             limits.map(|(l, u)| search.rng.uniform(l + margin, (u - margin).max(l + margin))).collect();
