@@ -7,6 +7,9 @@ import os
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from ._errors import argument_error
 
 StrPath = str | os.PathLike[str]
@@ -48,6 +51,32 @@ def seconds(function: str, name: str, value: Any) -> float | None:
     if value is None:
         return None
     return real(function, name, value, lambda number: 0 < number <= 1e7, "a number of seconds above 0 and at most 1e7")
+
+
+def real_numbers(values: Any) -> npt.NDArray[np.float64] | None:
+    """An array of doubles; None where the values are no real numbers. The array that was given, where it is one. None among the values is NaN."""
+    try:
+        array: npt.NDArray[Any] = np.asarray(values)
+        if array.dtype.kind == "O":
+            array = np.array([np.nan if entry is None else entry for entry in values])
+        # Neither booleans, complex numbers, strings nor objects.
+        return np.asarray(array, dtype=np.float64) if array.dtype.kind in "fiu" else None
+    except (TypeError, ValueError):
+        return None
+
+
+def shown(value: Any) -> str:
+    """A value as messages show it: on one line, and not too long."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 120 else f"{text[:117]}..."
+
+
+def level_of(function: str, value: Any) -> Any:
+    """What a plan is judged for."""
+    levels = ("geometry", "forces", "motion")
+    if not isinstance(value, str) or value not in levels:
+        raise argument_error(function, "level", f"is {value!r}", "one of " + ", ".join(f'"{level}"' for level in levels))
+    return value
 
 
 def real(function: str, name: str, value: Any, is_right: Callable[[float], bool], expected: str) -> float:

@@ -42,6 +42,18 @@ class Pose:
     quat_xyzw: FloatArray
     """(4,), unit quaternion, w >= 0."""
 
+    def __post_init__(self) -> None:
+        """Lists and tuples become arrays. Raises ``InputError`` (A510) for what holds no numbers."""
+        for name in ("position", "quat_xyzw"):
+            values = getattr(self, name)
+            if isinstance(values, np.ndarray):
+                continue
+            try:
+                array = np.array(values, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise argument_error("Pose", name, f"is {values!r}", "an array of numbers") from None
+            object.__setattr__(self, name, array)
+
     @property
     def matrix(self) -> FloatArray:
         """(4, 4): parent_from_child, so that `point_in_parent = matrix @ [*point_in_child, 1]`."""

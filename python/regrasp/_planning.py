@@ -257,11 +257,11 @@ def _listener(progress: Callable[[Progress], object]) -> Callable[[dict[str, Any
     return listen
 
 
-def _settings_text(settings: Mapping[str, Any]) -> str:
+def _settings_text(settings: Mapping[str, Any], function: str = "plan") -> str:
     try:
         return json.dumps(dict(settings), allow_nan=False)
     except (TypeError, ValueError) as error:
-        raise argument_error("plan", "settings", str(error), "what JSON can express") from None
+        raise argument_error(function, "settings", str(error), "what JSON can express") from None
 
 
 def check(

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _regrasp
-from ._arguments import StrPath, real, seconds, seed_of, whole
+from ._arguments import StrPath, level_of, real, real_numbers, seconds, seed_of, shown, whole
 from ._errors import argument_error
 from ._model import FloatArray, Pose, Scene, load_scene, pose_of
 from ._plan import Plan
@@ -85,7 +85,7 @@ class Session:
         Raises `InputError`, also for tasks of finger tracking.
         """
         self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
-        text = None if settings is None else _settings_text(settings)
+        text = None if settings is None else _settings_text(settings, "Session")
         n_threads = whole("Session", "threads", threads, 1, MAX_THREADS)
         graph = None if roadmap is None else os.fspath(roadmap)
         self._native = _regrasp.Session.open(self.scene._native, task, text, n_threads, graph)
@@ -95,6 +95,11 @@ class Session:
         self.object = next(entry for entry in self.scene.objects if entry.name == self._task.object)
         """The object that it moves."""
         self._times = threading.local()
+
+    @property
+    def start(self) -> Pose:
+        """World from object at the start of the task, as seed 0 draws it where the scene leaves it open."""
+        return self.scene.query(task=self._task.name or None).start
 
     @property
     def times(self) -> QueryTimes | None:
@@ -118,20 +123,23 @@ class Session:
         the world. presses: for every finger whether it is felt to press. distance, turn: how far the object, the fingertips
         and the joints may be moved, in metres and radians. sliding: from which relative speed on a contact slides.
         """
-        values = np.asarray(joints, dtype=np.float64)
+        values = real_numbers(joints)
+        if values is None:
+            expected = "one number per joint, in the order of Session.hand.joint_names"
+            raise argument_error("Session.project", "joints", f"is {shown(joints)}", expected)
         if values.ndim != 1:
             raise argument_error("Session.project", "joints", f"has shape {values.shape}", "one number per joint")
         asked: dict[str, Any] = {
             "pose": _parts("Session.project", "world_from_object", world_from_object),
             "joints": values.tolist(),
             "velocities": None,
-            "presses": None if presses is None else [bool(value) for value in presses],
+            "presses": None if presses is None else _presses(presses, len(self.hand.fingers)),
             "distance": real("Session.project", "distance", distance, lambda value: value > 0, "metres above 0"),
             "turn": real("Session.project", "turn", turn, lambda value: value > 0, "radians above 0"),
             "sliding": real("Session.project", "sliding", sliding, lambda value: value > 0, "metres per second above 0"),
         }
         if velocities is not None:
-            asked["velocities"] = tuple(np.asarray(entry, dtype=np.float64).tolist() for entry in velocities)
+            asked["velocities"] = _velocities(velocities, len(self.hand.joint_names))
         found, failure = self._native.project(asked)
         if found is None:
             return failure_of(str(failure))
@@ -162,12 +170,13 @@ class Session:
         level, progress: as in `regrasp.plan`. A failure says what stopped the search, but not which change of the scene would have
         helped: trying that takes time, and `regrasp.plan` does.
         """
+        _must_be(Start, start, "Session.plan", "start", "a Start of Session.project; look whether it is one before you plan")
         asked: dict[str, Any] = {
             "goal": _parts("Session.plan", "goal", goal),
             "seed": seed_of("Session.plan", seed),
             "max_work": whole("Session.plan", "max_work", max_work, 0, 2**64 - 1),
             "time_limit": seconds("Session.plan", "time_limit", time_limit),
-            "level": level,
+            "level": level_of("Session.plan", level),
             "progress": None if progress is None else _listener(progress),
         }
         found, outcome, times = self._native.plan(start._native, asked)
@@ -180,13 +189,43 @@ class Session:
 
     def check(self, plan: Plan, *, level: Level = "motion") -> Report:
         """Judges a plan against the query that it brings; one that brings none against the scene's task."""
-        return report_of(json.loads(self._native.check(plan._native, level)))
+        _must_be(Plan, plan, "Session.check", "plan", "a Plan")
+        return report_of(json.loads(self._native.check(plan._native, level_of("Session.check", level))))
 
     def __repr__(self) -> str:
         return f"<Session {self.scene.name!r}: {self._task.hand} and {self.object.name!r}>"
 
 
-def _parts(function: str, name: str, pose: Pose) -> tuple[list[float], list[float]]:
+def _must_be(kind: type, value: Any, function: str, name: str, expected: str) -> None:
+    if not isinstance(value, kind):
+        was = f"is a Failure: {value.message}" if isinstance(value, Failure) else f"is {shown(value)}"
+        raise argument_error(function, name, was, expected)
+
+
+def _presses(values: Any, n_fingers: int) -> list[bool]:
+    expected = f"{n_fingers} of True or False, one per finger of Session.hand.fingers"
+    pressing: list[Any] = [] if isinstance(values, (str, bytes)) or not hasattr(values, "__len__") else list(values)
+    if len(pressing) != n_fingers or not all(isinstance(value, (bool, int, np.bool_)) for value in pressing):
+        raise argument_error("Session.project", "presses", f"is {shown(values)}", expected)
+    return [bool(value) for value in pressing]
+
+
+def _velocities(values: Any, n_joints: int) -> tuple[list[float], list[float], list[float]]:
+    expected = f"finite numbers: {n_joints} of the joints, 3 of the object's motion, 3 of its turn"
+    if isinstance(values, (str, bytes)) or not hasattr(values, "__len__") or len(values) != 3:
+        raise argument_error("Session.project", "velocities", f"is {shown(values)}", expected)
+    found: list[list[float]] = []
+    for entry, n in zip(values, (n_joints, 3, 3)):
+        array = real_numbers(entry)
+        if array is None or array.shape != (n,) or not np.isfinite(array).all():
+            raise argument_error("Session.project", "velocities", f"has {shown(entry)}", expected)
+        found.append(array.tolist())
+    return found[0], found[1], found[2]
+
+
+def _parts(function: str, name: str, pose: Any) -> tuple[list[float], list[float]]:
+    if not isinstance(pose, Pose):
+        raise argument_error(function, name, f"is {shown(pose)}", "a regrasp.Pose")
     position = np.asarray(pose.position, dtype=np.float64)
     quat = np.asarray(pose.quat_xyzw, dtype=np.float64)
     if position.shape != (3,) or quat.shape != (4,) or not (np.isfinite(position).all() and np.isfinite(quat).all()):

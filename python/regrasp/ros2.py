@@ -33,6 +33,7 @@ import numpy as np
 
 from ._model import Pose
 from .execute.executor import Executor
+from .execute.guards import are_believable
 from .execute.log import Event, GoalResult
 from .execute.planning import ThreadPlanning
 from .execute.plant import Command, Observation
@@ -184,7 +185,7 @@ class Goals:
         xyz = np.array([position.x, position.y, position.z], dtype=np.float64)
         xyzw = np.array([quat.x, quat.y, quat.z, quat.w], dtype=np.float64)
         norm = float(np.linalg.norm(xyzw))
-        if not (np.isfinite(norm) and norm > 1e-6 and bool(np.isfinite(xyz).all())):
+        if not (are_believable(xyz) and are_believable(xyzw) and norm > 1e-6):
             return None
         with self._lock:
             if self._closed:

@@ -15,7 +15,7 @@ use regrasp::planners::in_hand::roadmap::GraspRoadmap;
 use regrasp::planners::in_hand::starting::{self, Observation, ProjectionLimits};
 use regrasp::scene::query::IN_HAND;
 use regrasp::session::{ObservedVelocities, SessionRoadmap, Touching};
-use regrasp::settings::{Overrides, settings_for};
+use regrasp::settings::{Overrides, SettingsError, settings_for};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -124,7 +124,12 @@ impl Session {
         guarded(py, || {
             let asked = Overrides { n_threads: threads, ..Overrides::default() };
             let settings = settings_for(IN_HAND, settings, &asked).map_err(|wrong| {
-                error::argument(py, "Session", "settings", format!("{wrong:?}"), "keys as \"settings\" in a plan file")
+                let problem = match wrong {
+                    SettingsError::Unreadable { problem, .. } | SettingsError::Invalid(problem) => problem,
+                    SettingsError::OtherMethod { name, problem } => format!("\"{name}\": {problem}"),
+                    SettingsError::NotForTracking { why, .. } => why.to_owned(),
+                };
+                error::argument(py, "Session", "settings", problem, "keys and values like \"settings\" in a plan file")
             })?;
             // A session is asked again and again: nobody waits for what would have helped.
             let settings = regrasp::InHandSettings { advise: false, ..settings.in_hand };

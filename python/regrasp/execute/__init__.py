@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .faults import FaultyPlant
     from .foreign_plant import ForeignPlant, ForeignSettings
     from .goals import turns
+    from .holding import holding_command
     from .log import Event, GoalResult, RunLog
     from .mujoco_plant import MujocoPlant, PlantSettings
     from .one_call import execute
@@ -41,6 +42,7 @@ __all__ = [
     "PlantSettings",
     "RunLog",
     "execute",
+    "holding_command",
     "turns",
 ]
 
@@ -60,6 +62,7 @@ _HOMES = {
     "PlantSettings": "mujoco_plant",
     "RunLog": "log",
     "execute": "one_call",
+    "holding_command": "holding",
     "turns": "goals",
 }
 

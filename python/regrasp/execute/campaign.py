@@ -118,24 +118,26 @@ def run_case(case: Case) -> Row:
     goals = turns(plant.pose, count=case.goals, seed=case.run, largest=case.largest, axis=axis)
     executor = Executor.of(ExecutorSessions.of(scene), plant, settings)
     log = executor.run(goals)
+    # What is counted is goals that were finished: a run that ends early says what became of the present one, too.
+    tried = [goal for goal in log.goals if goal.is_finished]
     position, _ = plant.truth()
-    away = float(np.linalg.norm(position - np.array(log.goals[-1].position))) if log.goals else 0.0
+    away = float(np.linalg.norm(position - np.array(tried[-1].position))) if tried else 0.0
     dropped = log.status == "lost" or plant.touching() == 0 or away > 0.03
     good = [
         goal
-        for goal in log.goals
+        for goal in tried
         if (goal.true_distance or 0.0) <= 0.002 and (goal.true_angle or 0.0) <= np.radians(2.0)
     ]
-    times = [goal.motion_time / goal.turn * np.pi / 2 for goal in log.goals if goal.reached and goal.turn >= np.radians(30.0)]
+    times = [goal.motion_time / goal.turn * np.pi / 2 for goal in tried if goal.reached and goal.turn >= np.radians(30.0)]
     return replace(
         base,
         status=log.status,
-        tried=len(log.goals),
+        tried=len(tried),
         reached=log.n_reached,
         within=len(good),
         dropped=int(dropped),
         legs=len(log.legs),
-        replans=log.n_replans,
+        replans=sum(max(goal.legs - 1, 0) for goal in tried),
         motion_per_90=float(np.median(times)) if times else 0.0,
         search_check=float(np.median([leg.search_seconds + leg.check_seconds for leg in log.legs])) if log.legs else 0.0,
         overhead=max((leg.overhead_seconds for leg in log.legs), default=0.0),

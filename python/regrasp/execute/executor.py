@@ -16,15 +16,17 @@ from .._session import Session, Start
 from ..simulate.model import Rig, Settings
 from ..simulate.reference import Array
 from .endings import GiveUp, GoOn, Withdrawn
-from .goals import Upcoming, between, towards
+from .goals import Present, Upcoming, between, towards
+from .guards import check_control, check_plant, checked_gains
+from .holding import HoldFinder, first_of
 from .leg import Leg, first_rig
-from .log import Event, GoalResult, LegRecord, RunLog
+from .log import NOT_FINISHED, Event, GoalResult, LegRecord, RunLog
 from .monitor import HOLDING, Monitor, Trigger, pose_error, why_gone
 from .planning import ChargedPlanning, Planning, Prepare, ThreadPlanning, Ticket
-from .plant import Plant
+from .plant import Command, Plant
 from .sessions import ExecutorSessions
 from .settings import ROUND, ExecutorSettings
-from .steering import Steering
+from .steering import Steering, Truth
 
 #: Trouble that may pass while the hand holds: a push moves the object, and the fingers bring it back.
 PASSING = frozenset({"deviation", "lost_contact", "slip"})
@@ -61,10 +63,16 @@ class Executor(Steering):
         last, and for starts that the session refuses; near: for starts that those refuse too, and for no plans; firm: that are asked before
         all others where ``grip`` says so; anew: of plans that end in grasps that hold well, asked where no plan leads on. stiffness, damping:
         of the robot's joints, where they are not those of replays.
-        listener: is told every event, and what became of every goal, as it happens, on the thread that runs.
+        listener: is told every event, and what became of every goal, as it happens, on the thread that runs. What it raises ends the run.
+        Raises ``InputError`` (A510) for a plant whose joints or fingers are not those of the session's hand, in their order, and for gains
+        that are none.
         """
+        check_plant(plant, session.hand)
+        gains = checked_gains(stiffness, damping, len(plant.joint_names))
+        if control is not None:
+            check_control(control)
         chosen = (settings or ExecutorSettings()).for_object(session.object)
-        super().__init__(plant, chosen, (stiffness, damping), listener, RunLog(scene=session.scene.name, settings=asdict(chosen)))
+        super().__init__(plant, chosen, gains, listener, RunLog(scene=session.scene.name, settings=asdict(chosen)))
         self._session = session
         base = control or Settings(hold_time=0.0)
         self._control = Settings(
@@ -79,6 +87,8 @@ class Executor(Steering):
         maker = planning or (ChargedPlanning if self._truth is not None else ThreadPlanning)
         self._planning = maker([*careful, session, *loose], self._settings, self._prepare)
         self._for_starts = [session, *loose, *near]
+        self._holds = HoldFinder(self._for_starts, [session, *loose], chosen)
+        self._present: Present | None = None
         self._is_round = session.object.shape.kind in ROUND
         self._firm = firm
         self._anew = anew
@@ -102,13 +112,17 @@ class Executor(Steering):
     # ------------------------------------------------------------------------------------------------------------- whole runs
 
     def run(self, goals: Iterable[Pose | None]) -> RunLog:
-        """Brings the object to every goal, in order. Ends with the hand holding, whatever happens; Ctrl-C is raised then.
+        """Brings the object to every goal, in order. Ends with the hand holding, whatever happens. Ctrl-C is raised then, and what a plant, a
+        listener or the goals raise; ``log`` says so by then. A second run adds to the same log.
 
         goals: may yield ``None`` where there is no goal for now: the hand holds for a tick, and asks again. It must not wait itself. Where
         it has a method ``is_withdrawn``, that is asked at every tick whether the present goal is still wanted; else the hand stops and holds.
+        A goal that is no pose of finite numbers raises ``InputError`` (A510), when all goals before it have been tried.
         """
         log = self.log
         upcoming = Upcoming(goals)
+        log.status, log.message = "running", ""
+        has_failed = False
         try:
             self._first_pose()
             self._home = Pose(self._senses.position.copy(), self._senses.quat[[1, 2, 3, 0]].copy())
@@ -120,38 +134,39 @@ class Executor(Steering):
                     if not upcoming.has_ended:
                         self._tick(moves=False, state="idle")
                     continue
-                started = self._senses.time
+                present = self._present = Present(goal, self._senses.time, before)
                 self._is_withdrawn = partial(upcoming.is_withdrawn, goal)
                 try:
-                    prepared, before = self._bring_to(goal, upcoming, prepared, before)
+                    prepared, before = self._bring_to(present, upcoming, prepared)
                 except Withdrawn:
-                    prepared, quat = None, np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
+                    prepared, present.motion_time = None, 0.0
                     self._event("withdrawn", "the goal is not wanted any more", "hold")
-                    self._result(goal, quat, False, started, 0.0, before, "withdrawn")
+                    self._result(present, False, "withdrawn", self._truth)
                     before = self._senses.quat
                 self._is_withdrawn = None
-                self._goal_index += 1
             log.status = "done"
         except GiveUp as end:
             log.status, log.message = end.status, str(end)
             self._event("object_gone" if end.status == "lost" else "gave_up", str(end), "give_up")
-        except KeyboardInterrupt:
+            self._leave()
+        except BaseException as error:
+            has_failed = not isinstance(error, KeyboardInterrupt)
             log.status = "interrupted"
-            self._event("interrupted", "the caller asked to stop", "hold")
+            log.message = f"{type(error).__name__}: {error}" if has_failed else "the caller asked to stop"
+            self._event("interrupted", log.message, "hold")
+            self._leave(has_failed=has_failed)
             raise
         finally:
-            self._planning.close()
-            if self._last_command is not None:
-                self._plant.apply(self._resting())
+            self._is_withdrawn = None
+            try:
+                self._rest(has_failed=has_failed)
+            finally:
+                self._planning.close()
         return log
 
-    def _bring_to(
-        self, goal: Pose, upcoming: Upcoming, prepared: Ticket | None, before: Array
-    ) -> tuple[Ticket | None, Array]:
+    def _bring_to(self, present: Present, upcoming: Upcoming, prepared: Ticket | None) -> tuple[Ticket | None, Array]:
         """To one goal; what was planned for the one after, and this goal's orientation."""
-        settings = self._settings
-        started, motion_time, why_not = self._senses.time, 0.0, ""
-        quat = np.array(goal.quat_xyzw)[[3, 0, 1, 2]]
+        settings, goal, quat, why_not = self._settings, present.goal, present.quat, ""
         is_reached = has_missed = False
         ahead: Ticket | None = None
         # A leg to another goal does not go on, unless nothing else is left.
@@ -177,7 +192,7 @@ class Executor(Steering):
                     self._event("no_plan", why_not, "hold" if is_last else "replan")
                     if is_last:
                         break
-                    motion_time += self._detour(goal, detour)
+                    present.motion_time += self._detour(goal, detour)
                     continue
                 attempt += 1
                 self._begin(ticket, ticket is made_ahead)
@@ -185,14 +200,16 @@ class Executor(Steering):
                 ahead = None if following is None else self._ask_ahead(ticket.answer, following)
             answer = "replan" if attempt < most else "hold"
             begun = self._senses.time
-            trigger = self._run_leg()
-            motion_time += self._senses.time - begun
+            try:
+                trigger = self._run_leg()
+            finally:
+                present.motion_time += self._senses.time - begun
             if trigger is not None:
                 why_not = f"{trigger.kind}: {trigger.message}"
                 ahead = None
                 self._event(trigger.kind, trigger.message, answer)
                 if settings.regrips_round and self._is_round and trigger.kind in PASSING and attempt < most:
-                    motion_time += self._regrip(goal)
+                    present.motion_time += self._regrip(goal)
                 continue
             is_reached, why_not = self._ends_at(goal, quat)
             if is_reached or not settings.replanning:
@@ -200,7 +217,7 @@ class Executor(Steering):
             ahead = None
             has_missed = True
             self._event("missed", why_not, answer)
-        self._result(goal, quat, is_reached, started, motion_time, before, why_not)
+        self._result(present, is_reached, why_not, self._truth)
         return ahead, quat
 
     def _leg_to(self, goal: Pose, prepared: Ticket | None, *, is_again: bool, has_missed: bool) -> Ticket:
@@ -261,26 +278,45 @@ class Executor(Steering):
         is_reached = distance <= self._settings.reached_distance and angle <= self._settings.reached_turn
         return is_reached, "" if is_reached else f"ended {1e3 * distance:.1f} mm and {np.degrees(angle):.1f} degrees off"
 
-    def _result(
-        self, goal: Pose, quat: Array, is_reached: bool, started: float, motion: float, before: Array, why_not: str
-    ) -> None:
-        position = np.array(goal.position)
+    def _leave(self, *, has_failed: bool = False) -> None:
+        """The run ends here: writes down what became of the goal that it was at. has_failed: the plant is not asked for the truth then."""
+        if self._present is not None:
+            self._result(self._present, False, NOT_FINISHED + self.log.message, None if has_failed else self._truth)
+
+    def _rest(self, *, has_failed: bool) -> None:
+        """The last command: it holds. has_failed: something was raised already, which the plant does not hide by raising again."""
+        if self._last_command is None:
+            return
+        try:
+            self._plant.apply(self._resting())
+        except Exception:
+            if not has_failed:
+                raise
+
+    def _find_hold(self) -> Command | str:
+        found = self._holds.find(self._senses)
+        return first_of(self._prepare(found, 1.0)) if isinstance(found, Plan) else found
+
+    def _result(self, present: Present, is_reached: bool, why_not: str, truth: Truth | None) -> None:
+        """Tells what became of a goal, and turns to the next."""
+        self._present = None
+        goal, quat, before, position = present.goal, present.quat, present.before, np.array(present.goal.position)
         distance = angle = float("inf")
         true_distance = true_angle = None
         if self._leg is not None:
             distance, angle = pose_error(self._leg, self._senses.position, self._senses.quat, position, quat)
-            if self._truth is not None:
-                true_distance, true_angle = pose_error(self._leg, *self._truth(), position, quat)
+            if truth is not None:
+                true_distance, true_angle = pose_error(self._leg, *truth(), position, quat)
         apart = min(float(np.linalg.norm(quat - before)), float(np.linalg.norm(quat + before)))
         self._tell(
             GoalResult(
                 position=position.tolist(),
                 quat_xyzw=np.array(goal.quat_xyzw).tolist(),
                 reached=is_reached,
-                start_time=started,
+                start_time=present.started,
                 time=self._senses.time,
                 legs=sum(leg.goal == self._goal_index for leg in self.log.legs),
-                motion_time=motion,
+                motion_time=present.motion_time,
                 turn=4.0 * float(np.arcsin(min(1.0, 0.5 * apart))),
                 distance=min(distance, 1e9),
                 angle=min(angle, 1e9),
@@ -289,6 +325,7 @@ class Executor(Steering):
                 why_not=why_not,
             )
         )
+        self._goal_index += 1
 
     # --------------------------------------------------------------------------------------------------------------- queries
 

@@ -32,7 +32,7 @@ class FaultyPlant:
         self.joint_names = plant.joint_names
         self.fingers = plant.fingers
         self.tick = plant.tick
-        for name in ("truth", "rig", "data", "scene", "pose"):
+        for name in ("truth", "rig", "data", "scene", "pose", "wait", "holding"):
             if hasattr(plant, name):
                 setattr(self, name, getattr(plant, name))
 

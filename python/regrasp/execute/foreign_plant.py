@@ -19,6 +19,7 @@ from ..simulate.model import Settings
 from ..simulate.reference import Array, quat_exp, quat_inverse, quat_product, rotation_matrices
 from .leg import Leg, first_rig
 from .plant import Command, Observation
+from .settings_check import FOREIGN, check_settings
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,10 @@ class ForeignSettings:
     impratio: float | None = None
     """How much stiffer friction is than the normal contact, in place of the model's. With MuJoCo's default of 1 held objects creep."""
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Raises ``InputError`` (A510) for a setting that no plant can have."""
+        check_settings(self, FOREIGN)
 
 
 class ForeignPlant:

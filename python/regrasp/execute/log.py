@@ -17,6 +17,8 @@ from .._plan import Plan
 
 FORMAT = "regrasp-run"
 FORMAT_VERSION = 1
+#: ``GoalResult.why_not`` of a goal that the run ended at begins so.
+NOT_FINISHED = "not finished: "
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,11 @@ class GoalResult:
     why_not: str
     """Empty where it was reached."""
 
+    @property
+    def is_finished(self) -> bool:
+        """False for the goal that the run ended at."""
+        return not self.why_not.startswith(NOT_FINISHED)
+
 
 @dataclass
 class RunLog:
@@ -107,7 +114,7 @@ class RunLog:
 
     scene: str = ""
     status: str = "running"
-    """``done``, ``gave_up``, ``lost``, ``interrupted`` or ``running``."""
+    """``done``, ``gave_up``, ``lost``, ``interrupted`` or ``running``: docs/reference/run-format.md."""
     message: str = ""
     settings: dict[str, Any] = field(default_factory=dict[str, Any])
     samples: list[Sample] = field(default_factory=list[Sample])

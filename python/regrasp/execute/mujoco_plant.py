@@ -22,6 +22,7 @@ from ..simulate.model import Rig, Settings, make_rig
 from ..simulate.plans import flat
 from ..simulate.reference import Array, PlanError, quat_exp, quat_product, reference
 from .plant import Command, Observation
+from .settings_check import PLANT, check_settings, check_simulation, instance
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,11 @@ class PlantSettings:
     push_time: float = 0.2
     """each so long, in a random direction."""
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Raises ``InputError`` (A510) for a setting that no plant can have."""
+        check_settings(self, {**PLANT, "simulation": instance(Settings)})
+        check_simulation("PlantSettings", self.simulation)
 
 
 class MujocoPlant:

@@ -22,11 +22,12 @@ def execute(
 ) -> RunLog:
     """Brings the object of ``plant`` to every goal, in order; as `Executor.run`.
 
-    session: of the plant's scene; a plant in MuJoCo knows its scene. The planner then has the settings of execution.
+    session: of the plant's scene; a plant in MuJoCo knows its scene. The planner then has the settings of execution. To keep the log of a run
+    that raises, make an `Executor`.
     """
     if session is not None:
         return Executor(session, plant, settings).run(goals)
     scene = getattr(plant, "scene", None)
     if scene is None:
-        raise ValueError("the plant does not know its scene: give a session")
+        raise ValueError('the plant has no member "scene": give a session, or use Executor.of(ExecutorSessions.of(scene), plant)')
     return Executor.of(ExecutorSessions.of(scene), plant, settings).run(goals)

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from .._model import Hand, Object
+from .settings_check import EXECUTOR, check_settings
 
 #: Settings of the planner that execution plans with, where nothing else is said: the speed that scenes allow by default, and short ramps.
 #: Every plan is improved a little, and the more the more relocations it has, by weights that are about the time that the motions take: at
@@ -220,6 +221,10 @@ class ExecutorSettings:
     planning_overhead: float = 0.05
     """Beside these, in seconds: check, preparation."""
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Raises ``InputError`` (A510) for a setting that no run can have."""
+        check_settings(self, EXECUTOR)
 
     def for_object(self, moved: Object) -> ExecutorSettings:
         """The same with what holds for this object."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +12,7 @@ import numpy as np
 from .._model import Pose
 from ..simulate.reference import Array
 from .endings import GiveUp, Withdrawn
+from .guards import check_observation, checked_holding
 from .leg import Leg
 from .log import Event, GoalResult, RunLog, Sample
 from .monitor import Monitor, pose_error, why_gone
@@ -24,6 +27,15 @@ SAMPLED = 5
 SERIOUS = frozenset({"joints_missing", "stale_pose", "pose_jump"})
 #: Events that a firmer grip may prevent.
 LOSING = frozenset({"deviation", "slip", "lost_contact", "missed"})
+#: A clock that has stood still for so many observations goes on by commands alone, as that of a simulation does.
+STILL = 3
+#: Seconds between two looks for a command that holds the object.
+LOOK_AGAIN = 0.1
+#: A clock that stands still for fewer observations than this is none that has stopped, however short ``patience`` is.
+LEAST_STILL = 20
+
+Truth = Callable[[], tuple[Array, Array]]
+"""Where the object really is: position, and orientation w x y z."""
 
 
 class Steering:
@@ -44,9 +56,13 @@ class Steering:
         self._listener = listener
         self._is_withdrawn: Callable[[], bool] | None = None
         self._waits: Callable[[], None] | None = getattr(plant, "wait", None)
-        self._truth: Callable[[], tuple[Array, Array]] | None = getattr(plant, "truth", None)
+        self._truth: Truth | None = getattr(plant, "truth", None)
         self._grips_firmer = settings.grip == "firm"
-        self._senses = Senses(len(plant.joint_names), settings)
+        self._senses = Senses(len(plant.joint_names), len(plant.fingers), settings)
+        self._most_still = max(LEAST_STILL, math.ceil(settings.patience / plant.tick))
+        self._n_looks = 0
+        self._why_no_hold = ""
+        """Why there is no command that holds the object; empty where that was not tried."""
         self._reflex = Reflex(settings)
         self._current: list[Fault] = []
         self._leg: Leg | None = None
@@ -74,27 +90,43 @@ class Steering:
             self._wait()
 
     def _wait(self) -> None:
-        """One tick before the first leg: without a command where the plant can wait, else with one that holds."""
+        """One tick before the first leg: without a command where the plant can wait, else with one that holds. Without any as long as
+        there is none that holds: the plant then does what it did before."""
         if self._waits is not None:
             self._waits()
         else:
             if self._last_command is None:
                 self._last_command = self._first_command()
-            self._plant.apply(self._last_command)
+            if self._last_command is None:
+                time.sleep(self._plant.tick)
+            else:
+                self._plant.apply(self._last_command)
         self._take(self._plant.observe())
 
-    def _first_command(self) -> Command:
-        """What the plant holds with as the run begins: what it says, what a simulation is told, else the joints where they are."""
-        holding: Command | None = getattr(self._plant, "holding", None)
+    def _first_command(self) -> Command | None:
+        """What the plant holds with as the run begins: what it says, what a simulation is told, else the forces of a plan from the grasp that
+        is seen. None where that is not known yet."""
+        holding = getattr(self._plant, "holding", None)
         if holding is not None:
-            return holding
-        stiffness, _ = self._gains
+            return checked_holding(holding, len(self._plant.joint_names))
         rig, data = getattr(self._plant, "rig", None), getattr(self._plant, "data", None)
         if rig is not None and data is not None:
             servo = np.array(data.ctrl[rig.motors])
-        else:
-            servo = self._senses.joints * (1.0 if stiffness is None else stiffness)
-        return Command(servo, self._senses.joints.copy(), np.zeros(len(servo)))
+            return Command(servo, self._senses.joints.copy(), np.zeros(len(servo)))
+        senses = self._senses
+        # A clock that goes on by itself brings the pose of the object soon.
+        if not senses.knows_joints or not (senses.knows_pose or senses.n_still >= STILL):
+            return None
+        self._n_looks += 1
+        if (self._n_looks - 1) % max(1, round(LOOK_AGAIN / self._plant.tick)) != 0:
+            return None
+        found = self._find_hold()
+        self._why_no_hold = found if isinstance(found, str) else ""
+        return None if isinstance(found, str) else found
+
+    def _find_hold(self) -> Command | str:
+        """The command that holds what is seen, or why there is none."""
+        return "nothing here makes plans"
 
     # -------------------------------------------------------------------------------------------------------------- holding
 
@@ -176,7 +208,7 @@ class Steering:
 
     def _take(self, seen: Any) -> None:
         leg = self._leg
-        faults = self._senses.take(seen, leg, self._k)
+        faults = self._senses.take(check_observation(self._plant, seen), leg, self._k)
         now = self._senses.time
         for fault in faults:
             # A fault that stays is told once a second.
@@ -184,6 +216,15 @@ class Steering:
                 self._faults[fault.kind] = now
                 self._event(fault.kind, fault.message, "hold" if fault.kind in SERIOUS else "ignore")
         self._current = [fault for fault in faults if fault.kind in SERIOUS]
+        if self._senses.n_still >= self._most_still:
+            raise GiveUp("gave_up", self._why_still())
+
+    def _why_still(self) -> str:
+        """Why the clock of the plant stands still."""
+        if self._leg is None and self._last_command is None and self._waits is None:
+            why = self._why_no_hold or "not every joint was seen"
+            return f"no command that holds the object is known ({why}): give the plant a member \"holding\" or \"wait\""
+        return f"the plant's clock stands still at {self._senses.time:g} s: {self._senses.n_still} observations in a row"
 
     def _sample(self, state: str, monitor: Monitor | None) -> None:
         leg, senses = self._leg, self._senses
@@ -219,4 +260,9 @@ class Steering:
     def _tell(self, happening: Event | GoalResult) -> None:
         self.log.add(happening)
         if self._listener is not None:
-            self._listener(happening)
+            try:
+                self._listener(happening)
+            except BaseException:
+                # It ends the run, and is not told about that.
+                self._listener = None
+                raise

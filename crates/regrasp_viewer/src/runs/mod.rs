@@ -88,6 +88,8 @@ pub enum Answer {
     Back,
     /// A new plan was made.
     Replan,
+    /// The fingers pressed harder for a moment.
+    Grip,
     /// The observation was left out.
     Ignore,
     /// The run ended with the hand holding.
@@ -259,6 +261,7 @@ impl Answer {
             Answer::Resume => "hold, then go on",
             Answer::Back => "go back",
             Answer::Replan => "replan",
+            Answer::Grip => "press harder",
             Answer::Ignore => "ignore",
             Answer::GiveUp => "give up",
             Answer::None => "none",
@@ -271,7 +274,7 @@ impl Answer {
             Answer::Replan => "#d55e00",
             Answer::Hold | Answer::Back => "#e69f00",
             Answer::GiveUp => "#c1121f",
-            Answer::Resume | Answer::Ignore | Answer::None => "#888888",
+            Answer::Resume | Answer::Grip | Answer::Ignore | Answer::None => "#888888",
         }
     }
 }

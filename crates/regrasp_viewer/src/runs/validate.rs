@@ -10,7 +10,9 @@ use std::path::Path;
 const MOST: usize = 4_000_000;
 /// Most fingertips.
 const MOST_FINGERS: usize = 64;
-/// Largest time, in seconds, and the largest of all other numbers: pages can draw them.
+/// Largest time of a clock, in seconds: those that count from 1970 are at 1.8e9.
+const LARGEST_TIME: f64 = 1e11;
+/// The largest of all other numbers: pages can draw them.
 const LARGEST: f64 = 1e9;
 /// How far the length of a quaternion may be from one.
 const QUATERNION_TOLERANCE: f64 = 1e-2;
@@ -32,9 +34,10 @@ pub(super) fn validate(path: &Path, text: &str, run: Run) -> Result<Run, InputEr
     };
     for ((list, index, key, may_be_negative), value) in numbers(&run) {
         let steps = [PathStep::Key(list), PathStep::Index(index), PathStep::Key(key)];
-        let lowest = if may_be_negative { -LARGEST } else { 0.0 };
-        if !(lowest..=LARGEST).contains(&value) {
-            add("E804", &steps, &|| format!("is {value}"), &format!("a number from {lowest} to {LARGEST}"));
+        let largest = if matches!(key, "time" | "start_time") { LARGEST_TIME } else { LARGEST };
+        let lowest = if may_be_negative { -largest } else { 0.0 };
+        if !(lowest..=largest).contains(&value) {
+            add("E804", &steps, &|| format!("is {value}"), &format!("a number from {lowest} to {largest}"));
         }
     }
     for (index, pair) in run.samples.windows(2).enumerate() {

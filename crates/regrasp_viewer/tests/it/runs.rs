@@ -29,6 +29,27 @@ fn a_run_is_read_and_written_and_read_again() {
     assert_eq!(leg_path(Path::new("out/run.json"), 0), Path::new("out/run.leg1.json"));
 }
 
+/// Every answer that the page of the format names can be read, and so can a clock that counts from 1970.
+#[test]
+fn answers_of_the_executor_and_times_of_a_wall_clock_are_read() {
+    let page = std::fs::read_to_string(repository().join("docs/reference/run-format.md")).unwrap();
+    let named = page.split_once("`answer` (`").and_then(|(_, rest)| rest.split_once("`)")).unwrap().0;
+    let answers: Vec<&str> = named.split("`, `").collect();
+    assert_eq!(answers.len(), 8, "{answers:?}");
+    for answer in answers {
+        let mut run = run();
+        run.events[0].answer = serde_json::from_str(&format!("\"{answer}\"")).unwrap_or_else(|_| panic!("{answer}"));
+        assert_eq!(read(&to_json(&run)), Ok(run));
+    }
+    let mut late = run();
+    let epoch = 1.77e9;
+    late.samples.iter_mut().for_each(|sample| sample.time += epoch);
+    late.events.iter_mut().for_each(|event| event.time += epoch);
+    late.goals.iter_mut().for_each(|goal| (goal.start_time, goal.time) = (goal.start_time + epoch, goal.time + epoch));
+    late.legs.iter_mut().for_each(|leg| leg.start_time += epoch);
+    assert_eq!(read(&to_json(&late)), Ok(late));
+}
+
 #[test]
 fn what_makes_no_sense_is_refused_with_its_place() {
     let cases = [
