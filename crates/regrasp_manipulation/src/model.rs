@@ -32,7 +32,7 @@ pub struct FingerModel<'a> {
     pub settle_radius: f64,
     /// Where the tip may touch; anywhere without one.
     pub pad: Option<&'a Pad>,
-    /// Distance that its joints keep from their limits: that of the settings, or of short ranges [`SHARE_OF_RANGE`].
+    /// Distance that its joints keep from their limits: that of the settings, but at most a twentieth of the shortest range.
     pub limit_margin: f64,
     /// Its last link at rest, in the world.
     pub link_at_rest: BodyFrame,
