@@ -294,8 +294,8 @@ impl Bodies {
                         a < b && first.body_depth.abs_diff(second.body_depth) > 1
                     }
                     (Owner::Finger(_), Owner::Finger(_)) => a < b,
-                    // The hand allows what stands on one joint; links across a joint that is held are judged.
-                    (Owner::Finger(_), Owner::Palm) => first.body_depth > 1 || first.link.is_some(),
+                    // The hand allows what one joint connects; links across a joint that is held are judged.
+                    (Owner::Finger(_), Owner::Palm) => true,
                     (Owner::Finger(_) | Owner::Object, Owner::Obstacle | Owner::Resting) => true,
                     // The palm may be mounted on an obstacle, but not stand in another hand or object.
                     (Owner::Palm, Owner::Resting) => true,

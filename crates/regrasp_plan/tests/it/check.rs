@@ -1,10 +1,12 @@
 //! The checker accepts a plan that is good by construction, and says what it cannot judge.
 
 use crate::sample::{self, judge, kinds};
-use regrasp_geometry::{Point, Shape, TriangleMesh};
+use regrasp_geometry::shape::PlacedShape;
+use regrasp_geometry::{Point, Pose, Shape, TriangleMesh};
 use regrasp_plan::Plan;
 use regrasp_plan::check::{CheckSettings, Level, Moment, ViolationKind, check, check_files};
 use regrasp_plan::format::to_json;
+use regrasp_robot::LinkId;
 use regrasp_robot::import::LoadOptions;
 use regrasp_scene::{GraspRequest, InHandQuery};
 use std::path::Path;
@@ -28,6 +30,20 @@ fn a_good_plan_with_a_free_finger_is_accepted() {
     let report = judge(&scene, &plan);
     assert!(report.accepted(), "{report:#?}");
     assert!(report.min_margin.unwrap() > 0.005);
+}
+
+/// The first link of a finger stands in the palm: what one joint connects may, and nothing else that the palm consists of.
+#[test]
+fn first_links_of_fingers_keep_off_what_the_hand_does_not_allow() {
+    let mut scene = sample::scene();
+    let hand = &mut scene.hands[0].hand;
+    let first = (LinkId(0), LinkId(1));
+    let knuckle = PlacedShape { parent_from_shape: Pose::identity(), shape: Shape::Sphere { radius: 0.012 } };
+    Arc::make_mut(&mut hand.robot).links[first.1.0].collision.push(knuckle);
+    let plan = sample::plan(&scene);
+    assert!(judge(&scene, &plan).accepted());
+    assert!(scene.hands[0].hand.allowed_pairs.remove(&first));
+    assert_eq!(kinds(&judge(&scene, &plan)), [ViolationKind::Collision]);
 }
 
 #[test]
