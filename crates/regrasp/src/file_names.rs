@@ -4,7 +4,9 @@ use std::path::{Component, Path, PathBuf};
 
 /// How the file at `writer` names `file`.
 pub fn name_from(writer: &Path, file: &Path, packages: &[(String, PathBuf)]) -> String {
-    let absolute = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    // A file that does not exist is told by the place where it was looked for.
+    let elsewhere = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let absolute = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| elsewhere(path));
     let file = absolute(file);
     let slashed = |path: &Path| path.to_string_lossy().replace('\\', "/");
     for (name, folder) in packages {
@@ -40,5 +42,24 @@ mod tests {
         let seen = |target: &str, folder: &str| relative(Path::new(target), Path::new(folder));
         assert_eq!(seen("/a/b/hand.urdf", "/a/b"), PathBuf::from("hand.urdf"));
         assert_eq!(seen("/a/b/hand.urdf", "/a/c/d"), PathBuf::from("../../b/hand.urdf"));
+    }
+
+    /// As seen from the folder of the scene, and not as it was typed in another one.
+    #[test]
+    fn files_that_do_not_exist_are_named_by_where_they_were_looked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let named = name_from(&folder.path().join("scene.toml"), Path::new("no/such/hand.toml"), &[]);
+        let found = folder.path().canonicalize().unwrap().join(named);
+        let meant = std::env::current_dir().unwrap().canonicalize().unwrap().join("no/such/hand.toml");
+        let plain = |path: &Path| {
+            path.components().fold(PathBuf::new(), |mut sum, part| {
+                match part {
+                    Component::ParentDir => drop(sum.pop()),
+                    part => sum.push(part),
+                }
+                sum
+            })
+        };
+        assert_eq!(plain(&found), plain(&meant));
     }
 }

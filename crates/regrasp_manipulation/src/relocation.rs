@@ -1,6 +1,13 @@
 //! The relocation of one finger while the others hold the object still: off along the normal, over, down along the
 //! normal (Saut 2011, sec. 4.2.3).
 
+/// The part in the air.
+pub mod air;
+/// Straight ways.
+mod straight;
+
+pub use straight::straightened;
+
 use crate::model::Model;
 use crate::passing::PassingOver;
 use crate::rolling::follow::ik_settings;

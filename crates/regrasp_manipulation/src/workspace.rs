@@ -108,6 +108,8 @@ pub struct Workspace<'a> {
     pub rrt_runs: RrtRuns,
     /// Configurations looked at, and what draws of contacts cost beside.
     pub work: u64,
+    /// True where every finger may find contacts by closing, and not only those that reach no points.
+    pub all_close: bool,
     /// What draws of contacts cost.
     pub draws: Draws,
     /// Contacts that fingers came to, and what was in the way there.
@@ -147,6 +149,7 @@ impl<'a> Workspace<'a> {
             passing_over: PassingOver::SurfaceFirst,
             rrt_runs: RrtRuns::default(),
             work: 0,
+            all_close: false,
             draws: Draws::default(),
             tried: Tried::default(),
             refusals: Refusals::default(),

@@ -33,12 +33,20 @@ pub fn draw_touch(
 ) -> Option<(Contact, Coordinates)> {
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(world_from_object.rotation));
     let hand_from_object = Pose::from_parts(world_from_object.translation.into(), rotation);
-    for _ in 0..LINES {
+    let has_one_line = has_one_line(workspace.model, finger);
+    let backwards = has_one_line && rng.chance(0.5);
+    // A finger that reaches points as well has other ways to a contact.
+    let n_lines = if has_one_line || !workspace.model.fingers[finger].closes() { 2 } else { LINES };
+    for index in 0..n_lines {
         if workspace.is_spent_on_draws() {
             return None;
         }
         let model = workspace.model;
-        let [open, closed] = draw_line(model, finger, world_from_object, rng);
+        let mut line = draw_line(model, finger, world_from_object, rng);
+        if has_one_line && (index % 2 == 1) != backwards {
+            line.reverse();
+        }
+        let [open, closed] = line;
         workspace.count_draws(LINE_WORK);
         let touch = touch_on_way(model, finger, &hand_from_object, &open, &closed);
         let Some((contact, joints)) = touch else { continue };
@@ -50,6 +58,11 @@ pub fn draw_touch(
         }
     }
     None
+}
+
+/// True for a finger of a single joint: it closes along one line, to either side.
+fn has_one_line(model: &Model, finger: usize) -> bool {
+    model.fingers[finger].ik.chain().n_coordinates() == 1
 }
 
 /// Ends of a line in the joints of `finger`: of a single joint those of its range, else drawn, the second one with the tip near the
@@ -73,8 +86,7 @@ fn draw_line(model: &Model, finger: usize, world_from_object: &Placement, rng: &
     };
     if n == 1 {
         let (low, high) = range(0);
-        let [low, high] = [low, high].map(|end| Coordinates::from_iter([end]));
-        return if rng.chance(0.5) { [low, high] } else { [high, low] };
+        return [low, high].map(|end| Coordinates::from_iter([end]));
     }
     let center = world_from_object.point(&model.frame.center_of_mass);
     let open = draw(rng);

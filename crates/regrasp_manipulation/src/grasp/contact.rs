@@ -150,7 +150,8 @@ pub fn reach(
 const MISSES: usize = 2;
 
 /// Draws contacts of `finger` that it can take, with its joints there: up to `n_wanted`, each given to `found`. Fingers that reach no points
-/// find theirs by closing.
+/// find theirs by closing; where only a grasp is asked for ([`Workspace::all_close`]) the others do so by turns: beside a large object hardly any
+/// posture that is drawn for a contact is clear, and a finger that closes comes from where it is.
 ///
 /// The workspace has the object at `world_from_object` and keeps it there; the finger is left anywhere.
 pub fn draw_footholds(
@@ -175,9 +176,16 @@ pub fn draw_footholds(
         }
         return;
     }
-    for _ in 0..8 * n_wanted {
+    for index in 0..8 * n_wanted {
         if n_found == n_wanted {
             return;
+        }
+        if workspace.all_close && index % 2 == 1 {
+            if let Some((contact, joints)) = draw_touch(workspace, finger, world_from_object, rng) {
+                found(contact, joints);
+                n_found += 1;
+            }
+            continue;
         }
         let Some(contact) = draw_contact(workspace, finger, world_from_object, rng) else { continue };
         let Some(joints) = reach(workspace, finger, &contact, world_from_object, rng) else { continue };

@@ -44,6 +44,7 @@ pub use regrasp_manipulation::settings::{ForceSettings, PhysicsSettings, SpeedSe
 use attempt::search::{Context, Search, Stop};
 use attempt::tally::Reason;
 use improving::first_look::first_look;
+use improving::straighten::straighten_relocations;
 use recording::record;
 use refusals::{given_grasp, refuse_after_transfers, refuse_hopeless};
 use regrasp_base::{Budget, Interrupt, Rng};
@@ -170,7 +171,9 @@ fn plan_with(
     let found = run_attempts(settings.n_threads, base_work, max_work, |index, work, winner| {
         let context = Context { model: &model, settings, seed, budget, winner, progress };
         let mut search = Search::new(context, [start_pose, goal_pose], index, work);
-        search.holds_only = query.stays();
+        if query.stays() {
+            search.ask_only_to_hold();
+        }
         let at_first = if index == 0 { first_look(&mut search, &legs) } else { None };
         let planned = at_first.map_or_else(|| plan_legs(&mut search, &legs), Ok).and_then(|mut solution| {
             if query.stays() {
@@ -178,6 +181,7 @@ fn plan_with(
                 solution.way = Sequence::at(solution.way.start().clone());
                 solution.steps_to_way.fill(0);
             }
+            straighten_relocations(&mut search, &mut solution.way);
             let plan = record::record(&model, settings, query, seed, &solution, Statistics::default());
             let plan = plan.map_err(|unbalanced| {
                 search.tally.add(Reason::NoForces(unbalanced));
@@ -268,13 +272,14 @@ fn with_better_end(context: Context, legs: &Legs, query: &InHandQuery, solution:
     let end = solution.way.end();
     let more = improving::ending::better_end(&mut search, end, margin);
     let mut counts = plan.statistics.clone();
-    counts.work += search.workspace.work;
-    counts.samples += search.n_samples;
-    let longer = more.and_then(|more| {
+    let longer = more.and_then(|mut more| {
+        straighten_relocations(&mut search, &mut more);
         let way = solution.way.clone().then(more)?;
         let longer = Solution { way, steps_to_way: solution.steps_to_way.clone() };
         record::record(model, settings, query, seed, &longer, Statistics::default()).ok()
     });
+    counts.work += search.workspace.work;
+    counts.samples += search.n_samples;
     with_counts(longer.unwrap_or(plan), counts)
 }
 

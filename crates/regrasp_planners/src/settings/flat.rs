@@ -72,6 +72,7 @@ flat! {
         long_plan: u64,
         shorten_share: f64,
         shorten_relocation: u64,
+        straighten: bool,
         end_margin: f64,
         cost: CostWeights,
         forces: Option<ForceSettings>,
@@ -91,7 +92,7 @@ flat! {
         alpha, guided_share, edge_crossings, finger_ways,
     }
     improvement: ImprovementSettings {
-        improve_work, long_plan, shorten_share, shorten_relocation, end_margin, cost,
+        improve_work, long_plan, shorten_share, shorten_relocation, straighten, end_margin, cost,
     }
 }
 

@@ -46,6 +46,7 @@ impl ImprovementSettings {
             improve_work: 0,
             shorten_share: 0.0,
             shorten_relocation: 0,
+            straighten: false,
             ..ImprovementSettings::default()
         }
     }
@@ -67,6 +68,8 @@ pub struct ImprovementSettings {
     /// 11.8 s, for 0.45 s more on the mean; twice as much saves nothing more. Hands in which a configuration takes longer get less, about as
     /// much time: an eighth where fingertips are meshes.
     pub shorten_relocation: u64,
+    /// Whether fingers that relocate go straight in their joints where that is clear and takes less time.
+    pub straighten: bool,
     /// Least closure margin of the grasp that a plan ends with, for plans that another one goes on from; 0 for none. Where the
     /// grasp at the goal is the planner's choice and holds less, fingers are relocated there until it holds so much, if that is found.
     pub end_margin: f64,
@@ -81,6 +84,7 @@ impl Default for ImprovementSettings {
             long_plan: 12,
             shorten_share: 0.5,
             shorten_relocation: 20_000,
+            straighten: true,
             end_margin: 0.0,
             cost: CostWeights::default(),
         }

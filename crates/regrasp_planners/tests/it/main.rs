@@ -13,6 +13,7 @@ mod in_hand_methods;
 mod leap;
 mod pads;
 mod physics;
+mod pinching;
 #[path = "../../../../tests/support/places.rs"]
 mod places;
 mod placing;
@@ -23,6 +24,7 @@ mod segments;
 mod several;
 mod soft_and_coupled;
 mod solids;
+mod straight;
 mod tips;
 mod tracking;
 mod tracking_gaits;

@@ -173,6 +173,14 @@ impl<'a> Search<'a> {
         self.workspace.model
     }
 
+    /// What is asked is a grasp, and not one from which a finger may lift. In hands that can do no more than hold, every finger then finds
+    /// contacts by closing too.
+    pub fn ask_only_to_hold(&mut self) {
+        let model = self.model();
+        self.holds_only = true;
+        self.workspace.all_close = !model.may_release || !model.may_move_object();
+    }
+
     /// Err when this attempt is to stop. To be called at least every few hundred units of work.
     pub fn check(&mut self) -> Result<(), Stop> {
         let work = self.workspace.work;

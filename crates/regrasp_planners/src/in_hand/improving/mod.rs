@@ -21,6 +21,8 @@ pub mod ending;
 pub mod first_look;
 /// The cheapest gait along a course.
 mod gaits;
+/// Straight ways of fingers.
+pub mod straighten;
 #[cfg(test)]
 mod tests;
 /// Contacts kept along parts of a course.
@@ -43,6 +45,7 @@ use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::model::Model;
 use regrasp_plan::plan::{Improvement, PlanFigures};
 use regrasp_roadmap::Limits;
+use straighten::straighten_relocations;
 use track::{Track, covers, draw_tracks};
 
 /// Tracks drawn per finger and course. By hand, with a look at how often a finger is left without a way.
@@ -166,7 +169,12 @@ pub fn improve(search: &mut Search, legs: &Legs, first: Solution) -> (Solution, 
             }
         });
         match better {
-            Ok(Some((better, figures))) => (best, improvement.improved) = (better, figures),
+            Ok(Some((better, of_better))) => {
+                (best, improvement.improved) = (better, of_better);
+                if straighten_relocations(search, &mut best.way) {
+                    improvement.improved = figures(model, weights, &best.way);
+                }
+            }
             Ok(None) => {}
             Err(stop) => {
                 search.cut_by_time |= matches!(stop, Stop::Budget(interrupt) if interrupt != Interrupt::WorkSpent);

@@ -43,7 +43,7 @@ impl Turns<'_> {
     }
 
     /// True with the object clear of palm and obstacles at `start` and on its way.
-    fn is_clear(&self, model: &Model, start: &Pose) -> bool {
+    pub fn is_clear(&self, model: &Model, start: &Pose) -> bool {
         let is_clear = |pose: &Pose| object_blocked_by(model, pose).is_none();
         is_clear(start) && self.others(start).iter().all(is_clear)
     }

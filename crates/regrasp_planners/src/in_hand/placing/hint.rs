@@ -60,7 +60,9 @@ fn nearest_with_grasp(
     let start = query.world_from_object_start;
     let mut search = Search::new(context, [start; 2], 0, u64::MAX);
     search.rng = Rng::keyed(seed, "start_hint", 0);
-    search.holds_only = query.stays();
+    if query.stays() {
+        search.ask_only_to_hold();
+    }
     (0..TRIED).find_map(|k| {
         let share = k as f64 / (TRIED - 1) as f64;
         let distance = DISTANCES[0] + share * (DISTANCES[1] - DISTANCES[0]);

@@ -87,7 +87,9 @@ impl Looks<'_> {
         let model = self.context.model;
         let mut search = Search::new(self.context, [Pose::identity(); 2], 0, u64::MAX);
         search.rng = Rng::keyed(self.context.seed, "place_evidence", index);
-        search.holds_only = !self.moves;
+        if !self.moves {
+            search.ask_only_to_hold();
+        }
         let first = Evidence::gather(&mut search, start);
         let mut worths = vec![first.worth(model)];
         if first.grasp.is_some() {

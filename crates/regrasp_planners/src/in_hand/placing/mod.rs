@@ -23,6 +23,8 @@ pub mod samples;
 mod searching;
 /// Which sizes of objects fit a hand.
 pub mod sizes;
+/// Poses at which fingers close on the object.
+mod touching;
 
 use crate::in_hand::attempt::search::Context;
 use crate::in_hand::attempt::tally::{Reason, Tally};
@@ -45,6 +47,7 @@ use regrasp_robot::inspect::TipReach;
 use regrasp_scene::{HandView, InHandQuery};
 use searching::ShortSearches;
 use std::sync::atomic::AtomicUsize;
+use touching::touched;
 
 /// Postures from which it is known where fingertips reach.
 const POSTURES: usize = 12_000;
@@ -142,6 +145,11 @@ pub fn place(
     searches.first(&mut looks.places, &mut looks.tried)?;
     if looks.tried.solved == 0 && cut.is_none() {
         cut = looks.widen(&estimated, &proposals, &outlook, &mut rng);
+        searches.first(&mut looks.places, &mut looks.tried)?;
+    }
+    if looks.places.is_empty() && cut.is_none() && !moves && model.closing_fingers() != 0 {
+        let (held, ended) = touched(context, &asked, &proposals, &mut looks.tried, told);
+        cut = ended.or_else(|| looks.look_at(&held));
         searches.first(&mut looks.places, &mut looks.tried)?;
     }
     if cut == Some(Interrupt::Cancelled) {

@@ -75,7 +75,9 @@ pub fn sizes(hand: &Hand, reach: &TipReach, settings: &InHandSettings, seed: u64
         let context = Context { model: &model, settings, seed, budget: &budget, winner: &winner, progress: &|_| {} };
         let mut search = Search::new(context, [Pose::identity(); 2], 0, u64::MAX);
         search.rng = Rng::keyed(seed, "sizes_evidence", index as u64);
-        search.holds_only = !model.may_release || !model.may_move_object();
+        if !model.may_release || !model.may_move_object() {
+            search.ask_only_to_hold();
+        }
         let mut best = Size { radius, center: None, lets_go: false, evidence: 0.0 };
         let clear = poses.iter().filter(|(_, pose)| object_blocked_by(&model, pose).is_none());
         for (_, pose) in clear.take(LOOKED_AT) {

@@ -3,13 +3,13 @@
 //! This is a measure, not a judge: it shares everything with the planner. The judge is `regrasp_plan::check`.
 
 use crate::settings::InHandSettings;
-use regrasp_geometry::collision::Placement;
-use regrasp_geometry::{Point, Pose, Vector};
+use regrasp_geometry::Pose;
 use regrasp_grasp::Contact;
 use regrasp_manipulation::grasp::state::GraspState;
 use regrasp_manipulation::in_world::plan_in_hand_frame;
 use regrasp_manipulation::model::Model;
 use regrasp_manipulation::recording::waypoint::{contact_of, joints_of};
+use regrasp_manipulation::relocation::air::{End, ends_of, in_air};
 use regrasp_manipulation::workspace::start::distances_to_keep;
 use regrasp_manipulation::workspace::{TipMode, Workspace};
 use regrasp_plan::plan::{Plan, Segment, SegmentKind, Waypoint};
@@ -147,21 +147,13 @@ pub fn follow_relocation(
     path: &[Coordinates],
 ) -> Result<(), usize> {
     let model = workspace.model;
-    let [first, last] = [path.first(), path.last()];
-    let end = |contact: Option<&Contact>, joints: Option<&Coordinates>| {
-        contact.zip(joints).map(|(contact, joints)| End::new(model, finger, pose, contact, joints))
-    };
-    let ends = [end(contacts[0], first), end(contacts[1], last)];
-    let is_over = |end: &Option<End>, joints: &Coordinates| {
-        end.as_ref().is_some_and(|end| end.is_under(&model.fingers[finger].ik.tip(joints)))
-    };
-    let n_up = path.iter().take_while(|joints| is_over(&ends[0], joints)).count();
-    let n_down = path.iter().rev().take_while(|joints| is_over(&ends[1], joints)).count();
+    let ends = ends_of(model, finger, pose, contacts, path);
+    let air = in_air(model, finger, &ends, path);
     for k in 1..path.len() {
         let near = |end: &End| TipMode::Near { finger, normal_in_world: end.normal };
         let mode = match &ends {
-            [Some(end), _] if k < n_up => near(end),
-            [_, Some(end)] if k > path.len() - n_down => near(end),
+            [Some(end), _] if k <= *air.start() => near(end),
+            [_, Some(end)] if k > *air.end() => near(end),
             _ => TipMode::Away { finger, clearance: 0.0 },
         };
         if !workspace.step_finger(finger, &path[k], mode) {
@@ -170,36 +162,3 @@ pub fn follow_relocation(
     }
     Ok(())
 }
-
-/// A contact with the line that the tip's centre leaves it along.
-struct End {
-    /// Where the tip's centre is in contact.
-    foot: Point,
-    normal: Vector,
-    /// How far from the line it may be, per height: a finger that cannot go straight up leaves at a slant.
-    slant: f64,
-}
-
-impl End {
-    /// `joints` are those of the contact.
-    fn new(model: &Model, finger: usize, pose: &Pose, contact: &Contact, joints: &Coordinates) -> Self {
-        let placement = Placement::from(pose);
-        let normal: Vector = placement.vector(&contact.normal_in_object);
-        let foot = placement.point(&contact.point_in_object) - model.fingers[finger].arm_with(joints, &normal);
-        let slant = if model.fingers[finger].closes() { LARGEST_SLANT } else { 0.0 };
-        End { foot, normal, slant }
-    }
-
-    /// True when the centre of a tip is over the contact: straight, or as slanted as it may be.
-    fn is_under(&self, tip: &Point) -> bool {
-        let arm = tip - self.foot;
-        let height = arm.dot(&self.normal);
-        (arm - self.normal * height).norm() < STRAIGHT + self.slant * height.max(0.0) && height > -STRAIGHT
-    }
-}
-
-/// Slant that checks allow a lift: the tangent of 60 degrees.
-const LARGEST_SLANT: f64 = 1.732;
-
-/// Distance from the normal that still counts as on it, in metres: far above what solvers leave.
-const STRAIGHT: f64 = 1e-5;
