@@ -106,9 +106,9 @@ def run(reflex: bool, seed: int) -> tuple[RunLog, int]:
     return log, plant.touching()
 
 
-@pytest.mark.parametrize("seed", [9, 11])
+@pytest.mark.parametrize("seed", [8, 13])
 def test_a_box_that_is_pushed_out_stays_with_the_reflex(seed: int) -> None:
-    """Of the seeds 0 to 11 those that lose it without (0, 9, 11), but 0, with which one goal is missed."""
+    """Of the seeds 0 to 23 six lose it without (0, 8, 13, 14, 15, 21), and none of these with it; with 0 and 14 one goal is missed."""
     log, touching = run(reflex=True, seed=seed)
     assert log.status == "done" and log.n_reached == 5 and touching >= 3, log.message
     assert [event.answer for event in log.events if event.kind == "sudden_force"]
