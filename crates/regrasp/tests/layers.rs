@@ -163,6 +163,7 @@ const PRIVATE: &[(&str, &[&str])] = &[
     ("zip", &["regrasp_export"]),
     ("clarabel", &["regrasp_grasp", "regrasp_plan"]),
     ("pulp", &["regrasp_arms"]),
+    ("wide", &["regrasp_robot"]),
     ("saphyr-parser", &["regrasp_grasp"]),
 ];
 

@@ -9,6 +9,8 @@
 mod alone;
 /// Where everything is at one moment.
 mod configuration;
+/// Directions that separate pairs.
+mod directions;
 /// What draws of contacts cost.
 mod draws;
 /// Obstacles near the bodies that move.
@@ -24,7 +26,7 @@ pub mod tried;
 
 use crate::forces::limits::Refusals;
 use crate::grasp::state::{Contacts, GraspState, HandJoints};
-use crate::model::{Carrier, Model, Pair};
+use crate::model::{Carrier, Model, Pair, Usual};
 use crate::passing::{PassingOver, RrtRuns};
 use configuration::{Configuration, midway, place_finger, place_object};
 use draws::Draws;
@@ -397,6 +399,26 @@ impl<'a> Workspace<'a> {
     /// True when the pair stays apart during the step from `now` to `next`; its slack is then the one at `next`.
     #[inline]
     fn pair_is_clear(&mut self, index: usize, mode: TipMode) -> bool {
+        let model = self.model;
+        let Some(Some([a, b])) = model.usual.get(index).copied().map(Usual::bodies) else {
+            return self.near_pair_is_clear(index, mode);
+        };
+        // Most pairs are far apart: of them nothing is looked at but their balls.
+        let motion = self.motion[a] + self.motion[b];
+        if self.slack[index] - motion > model.settings.clearance {
+            self.slack[index] -= motion;
+            return true;
+        }
+        let between = (self.next.centers[a] - self.next.centers[b]).norm() - model.radii[a] - model.radii[b];
+        if between > model.settings.clearance + motion {
+            self.slack[index] = between;
+            return true;
+        }
+        self.near_pair_is_clear(index, mode)
+    }
+
+    /// The same for a pair that may be near.
+    fn near_pair_is_clear(&mut self, index: usize, mode: TipMode) -> bool {
         let pair = self.pairs[index];
         // Obstacles do not move, and are never first.
         let motion = self.motion[pair.a] + self.motion.get(pair.b).copied().unwrap_or(0.0);
@@ -488,35 +510,6 @@ impl<'a> Workspace<'a> {
             }
         }
         self.trees_apart(index, required)
-    }
-
-    /// The direction that last separated the pair, in the world; in the middle of the step where it turns with the object.
-    #[inline]
-    fn last_direction(&self, index: usize) -> Vector {
-        let direction = self.directions[index];
-        match self.turns_with(index) {
-            Some(body) if direction != Vector::zeros() => {
-                let [now, next] = [&self.now, &self.next].map(|end| end.placements[body].vector(&direction));
-                (now + next).try_normalize(1e-6).unwrap_or(next)
-            }
-            _ => direction,
-        }
-    }
-
-    /// What is stored of a direction in the world that separates the pair at `next`.
-    #[inline]
-    fn to_keep(&self, index: usize, direction: &Vector) -> Vector {
-        match self.turns_with(index) {
-            Some(body) => self.next.placements[body].vector_to_child(direction),
-            None => *direction,
-        }
-    }
-
-    /// The object, where it is one of the pair.
-    #[inline]
-    fn turns_with(&self, index: usize) -> Option<usize> {
-        let (pair, object) = (self.pairs[index], self.model.object);
-        (pair.a == object || pair.b == object).then_some(object)
     }
 
     /// Looks for a direction that separates at both ends, between one that does at `now` and one that does at `next`: long

@@ -12,19 +12,25 @@
 //! `u_i`, plus `r`. All `u_i` lie in the plane `n . u = k`.
 
 use super::{Pad, spiral};
-use nalgebra::Matrix3;
-use regrasp_geometry::{ConvexHull, Point, Vector};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2};
+use regrasp_geometry::frame::tangents;
+use regrasp_geometry::{ConvexHull, Point, UnitVector, Vector};
+use wide::f64x4;
 
 mod table;
 
-use table::NormalTable;
+use table::{Block, LANES, MOST_BLOCKS, NormalTable, in_blocks, largest_of};
 
 /// The exponent `p`. Larger ones follow corners more closely, and are less even between them.
 const EXPONENT: i32 = 200;
 /// Points with a smaller share of the largest `s_i` do not count: `0.88^200` is 8e-12.
-const LEAST_SHARE: f64 = 0.88;
+const LISTED_SHARE: f64 = 0.88;
+/// What is listed and has a smaller share yet, or is behind the centre, counts as if it had this one: `0.5^200` is 6e-61.
+const LEAST_SHARE: f64 = 0.5;
+/// In the fit, powers below this do not count.
+const LEAST_POWER: f64 = 1e-11;
 /// Most corners that are kept.
-pub const MOST_POINTS: usize = 512;
+pub const MOST_POINTS: usize = LANES * MOST_BLOCKS;
 /// Corners are added until none is missed by more than this, in metres.
 const MISSED: f64 = 4e-6;
 /// Directions in which the surface is fitted, and others in which it is measured.
@@ -69,12 +75,12 @@ impl SmoothHull {
             Target { normal: n, corner, support: corner.dot(&n), counts: pad.is_none_or(|pad| pad.holds(&n)) }
         };
         let targets: Vec<Target> = spiral(FITTED).map(&mut target).collect();
-        let points = choose(&targets);
-        let mut surface = SmoothHull { table: NormalTable::new(&points, LEAST_SHARE), points, rounding, reach: 0.0 };
+        let points = in_blocks(choose(&targets));
+        let mut surface = SmoothHull { table: NormalTable::new(&points, LISTED_SHARE), points, rounding, reach: 0.0 };
         for _ in 0..FIT_ROUNDS {
             surface.fit(&targets);
         }
-        surface.table = NormalTable::new(&surface.points, LEAST_SHARE);
+        surface.table = NormalTable::new(&surface.points, LISTED_SHARE);
         let measured: Vec<Target> = spiral(MEASURED).map(&mut target).filter(|target| target.counts).collect();
         let off = |surface: &Self| {
             let apart = measured.iter().map(|target| surface.support(&target.normal) - target.support);
@@ -109,78 +115,59 @@ impl SmoothHull {
     /// The shares of the points towards `n`, by index, and the smoothed maximum.
     fn shares(&self, n: &Vector, shares: &mut Vec<(usize, f64)>) -> f64 {
         shares.clear();
-        let (largest, sum) = self.powers(n, |i, _, _, power| shares.push((i, power)));
+        let (largest, sum) = powers(self.table.near(n), n, |block, _, _, powers| {
+            let shares_of_block = powers.to_array().into_iter().enumerate().filter(|(_, power)| *power > LEAST_POWER);
+            shares.extend(shares_of_block.map(|(lane, power)| (block * LANES + lane, power)));
+        });
         shares.iter_mut().for_each(|(_, share)| *share /= sum);
         largest * root(sum)
     }
 
-    /// Calls `each` with every point that counts towards `n`: its index, itself, `s_i`, and `(s_i / max s)^p`. The largest `s_i`,
-    /// and the sum of the powers.
-    #[inline]
-    fn powers(&self, n: &Vector, mut each: impl FnMut(usize, &[f64; 3], f64, f64)) -> (f64, f64) {
-        let (indices, points) = self.table.near(n);
-        let along = |[x, y, z]: &[f64; 3]| x * n.x + y * n.y + z * n.z;
-        let largest = points.iter().map(along).fold(0.0, |most: f64, s| if s > most { s } else { most });
-        let least = LEAST_SHARE * largest;
-        let mut sum = 0.0;
-        for (point, &i) in points.iter().zip(indices) {
-            let s = along(point);
-            if s > least {
-                let power = power(s / largest);
-                sum += power;
-                each(usize::from(i), point, s, power);
-            }
-        }
-        (largest, sum)
-    }
-
     /// The support function: how far the surface reaches towards the unit vector `n`.
     pub fn support(&self, n: &Vector) -> f64 {
-        let (largest, sum) = self.powers(n, |_, _, _, _| ());
+        let (largest, sum) = powers(self.table.near(n), n, |_, _, _, _| ());
         largest * root(sum) + self.rounding
     }
 
     /// The point with the outward normal `n`, a unit vector, from the centre.
     #[inline]
     pub fn point(&self, n: &Vector) -> Vector {
-        let mut weighted = Vector::zeros();
-        let (largest, sum) = self.powers(n, |_, [x, y, z], s, power| {
-            let weight = power / s;
-            weighted += Vector::new(x * weight, y * weight, z * weight);
+        let mut weighted = [f64x4::ZERO; 3];
+        let (largest, sum) = powers(self.table.near(n), n, |_, points, inverse, power| {
+            let weight = power * inverse;
+            weighted.iter_mut().zip(points).for_each(|(sum, part)| *sum += *part * weight);
         });
-        weighted * (largest * root(sum) / sum) + n * self.rounding
+        Vector::from(weighted.map(total)) * (largest * root(sum) / sum) + n * self.rounding
     }
 
     /// The point with the outward normal `n`, a unit vector, and the curvature there.
     pub fn bend(&self, n: &Vector) -> Bend {
-        // Points of the plane in which all lie, from one of them: differences lose nothing.
-        let mut first: Option<Vector> = None;
-        let mut mean = Vector::zeros();
-        // Sums of the squares and products: xx, yy, zz, xy, xz, yz.
-        let mut squares = [0.0; 6];
-        let (largest, sum) = self.powers(n, |_, [x, y, z], s, power| {
-            let at = Vector::new(x / s, y / s, z / s);
-            let from = at - *first.get_or_insert(at);
-            let weighted = from * power;
-            mean += weighted;
-            let products = [
-                weighted.x * from.x,
-                weighted.y * from.y,
-                weighted.z * from.z,
-                weighted.x * from.y,
-                weighted.x * from.z,
-                weighted.y * from.z,
-            ];
-            squares.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+        // How far the points of the plane in which all lie are from where `n` meets it, along two directions in it.
+        let (x, y) = tangents(&UnitVector::new_unchecked(*n));
+        let directions = [splat(&x), splat(&y)];
+        let mut means = [f64x4::ZERO; 2];
+        let (mut xx, mut xy, mut yy) = (f64x4::ZERO, f64x4::ZERO, f64x4::ZERO);
+        let (largest, sum) = powers(self.table.near(n), n, |_, points, inverse, power| {
+            let [along_x, along_y] = [along(points, &directions[0]) * inverse, along(points, &directions[1]) * inverse];
+            let (weighted_x, weighted_y) = (along_x * power, along_y * power);
+            means[0] += weighted_x;
+            means[1] += weighted_y;
+            xx += weighted_x * along_x;
+            xy += weighted_x * along_y;
+            yy += weighted_y * along_y;
         });
         let smoothed = largest * root(sum);
-        mean /= sum;
-        let [xx, yy, zz, xy, xz, yz] = squares.map(|square| square / sum);
-        let covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) - mean * mean.transpose();
-        let around = Matrix3::identity() - n * n.transpose();
+        let [mean_x, mean_y] = means.map(|mean| total(mean) / sum);
+        let [xx, xy, yy] = [xx, xy, yy].map(|square| total(square) / sum);
+        let flatness = f64::from(EXPONENT - 1) * smoothed;
+        let radii =
+            Matrix2::new(xx - mean_x * mean_x, xy - mean_x * mean_y, xy - mean_x * mean_y, yy - mean_y * mean_y)
+                * flatness
+                + Matrix2::identity() * self.rounding;
+        let plane = Matrix3x2::from_columns(&[x.into_inner(), y.into_inner()]);
         Bend {
-            point: (first.unwrap_or_default() + mean) * smoothed + n * self.rounding,
-            radii: covariance * (f64::from(EXPONENT - 1) * smoothed) + around * self.rounding,
+            point: (n + x.as_ref() * mean_x + y.as_ref() * mean_y) * smoothed + n * self.rounding,
+            radii: plane * radii * plane.transpose(),
         }
     }
 
@@ -205,9 +192,50 @@ impl SmoothHull {
     }
 }
 
+/// Calls `each` with every four points: the number of their block, themselves, `1 / s_i`, and `(s_i / max s)^p`. The largest `s_i`, and the sum of the powers.
+///
+/// Nothing is multiplied and added at once, so that results are the same on every machine.
+#[inline]
+fn powers<'a>(
+    blocks: impl Iterator<Item = (usize, &'a Block)> + Clone,
+    n: &Vector,
+    mut each: impl FnMut(usize, &Block, f64x4, f64x4),
+) -> (f64, f64) {
+    let n = splat(n);
+    let most = blocks.clone().fold(f64x4::ZERO, |most, (_, points)| most.fast_max(along(points, &n)));
+    let largest = largest_of(most);
+    let (least, scale) = (f64x4::splat(LEAST_SHARE * largest), f64x4::splat(1.0 / largest));
+    let mut sum = f64x4::ZERO;
+    for (block, points) in blocks {
+        let s = along(points, &n).fast_max(least);
+        let power = power(s * scale);
+        sum += power;
+        each(block, points, f64x4::ONE / s, power);
+    }
+    (largest, total(sum))
+}
+
+/// How far four points reach towards a direction.
+#[inline]
+fn along([x, y, z]: &Block, n: &Block) -> f64x4 {
+    *x * n[0] + *y * n[1] + *z * n[2]
+}
+
+#[inline]
+fn splat(v: &Vector) -> Block {
+    [f64x4::splat(v.x), f64x4::splat(v.y), f64x4::splat(v.z)]
+}
+
+/// The sum of four numbers, in an order that is the same on every machine.
+#[inline]
+fn total(lanes: f64x4) -> f64 {
+    let [a, b, c, d] = lanes.to_array();
+    (a + b) + (c + d)
+}
+
 /// `q^200`, the same on every machine.
 #[inline]
-fn power(q: f64) -> f64 {
+fn power(q: f64x4) -> f64x4 {
     let q2 = q * q;
     let q4 = q2 * q2;
     let q8 = q4 * q4;

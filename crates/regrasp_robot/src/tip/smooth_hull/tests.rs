@@ -119,3 +119,30 @@ fn a_polyhedron_beside_its_origin_has_no_surface() {
     let points: Vec<Point> = cuboid(Vector::repeat(0.01)).vertices().iter().map(|p| p + Vector::x() * 0.02).collect();
     assert!(SmoothHull::near(&ConvexHull::new(&points).unwrap(), None).is_none());
 }
+
+/// Lists leave nothing out that counts: sums over all points are the same, on a tip as flat as a nail, too.
+#[test]
+fn nothing_that_counts_is_left_out() {
+    let mut rng = Rng::keyed(4, "lists", 0);
+    let nail = TipEllipsoid::new(Vector::new(0.015, 0.010, 0.0015), UnitQuaternion::from_euler_angles(0.3, 0.2, 0.1));
+    let nail = ConvexHull::new(&spiral(3000).map(|n| Point::from(nail.arm(&n))).collect::<Vec<_>>()).unwrap();
+    for (name, hull) in tips().into_iter().map(|(name, hull, _)| (name, hull)).chain([("nail", nail)]) {
+        let (surface, _) = SmoothHull::near(&hull, None).unwrap();
+        for _ in 0..4000 {
+            let n = Vector::from(rng.direction());
+            let reaches = || surface.points().iter().map(|point| point.dot(&n).max(0.0));
+            let largest = reaches().fold(0.0, f64::max);
+            let sum: f64 = reaches().map(|s| (s / largest).powi(EXPONENT)).sum();
+            let weighted: Vector = surface
+                .points()
+                .iter()
+                .map(|point| point * (point.dot(&n).max(0.0) / largest).powi(EXPONENT - 1))
+                .sum();
+            let root = sum.powf(1.0 / f64::from(EXPONENT));
+            let off = surface.support(&n) - (largest * root + surface.rounding());
+            assert!(off.abs() < 1e-13, "{name}: {off}");
+            let off = surface.point(&n) - (weighted * (root / sum) + n * surface.rounding());
+            assert!(off.norm() < 1e-11, "{name}: {off}");
+        }
+    }
+}
