@@ -164,6 +164,7 @@ const PRIVATE: &[(&str, &[&str])] = &[
     ("clarabel", &["regrasp_grasp", "regrasp_plan"]),
     ("pulp", &["regrasp_arms"]),
     ("wide", &["regrasp_robot"]),
+    ("robust", &["regrasp_geometry"]),
     ("saphyr-parser", &["regrasp_grasp"]),
 ];
 

@@ -1,5 +1,7 @@
 //! Convex hulls with adjacency, for support queries.
 
+/// Of points that defeat the usual way.
+mod careful;
 /// As parry computes it.
 mod quick;
 
@@ -59,8 +61,13 @@ impl ConvexHull {
 
     /// The hull itself, whatever the number of points.
     fn exact(points: &[Point]) -> Result<Self, HullError> {
-        let (vertices, triangles) = quick::convex_hull(points)?;
-        ConvexHull::from_polyhedron(vertices, triangles, &PointTree::new(points))
+        let tree = PointTree::new(points);
+        let hull =
+            quick::convex_hull(points).and_then(|(v, triangles)| ConvexHull::from_polyhedron(v, triangles, &tree));
+        match hull {
+            Err(HullError::Failed { .. }) => hull.or_else(|error| careful::hull(&tree).ok_or(error)),
+            _ => hull,
+        }
     }
 
     /// A polyhedron of a few thousand corners that contains all `points` and is hardly larger than their hull: the hull
@@ -81,19 +88,33 @@ impl ConvexHull {
         extreme.sort_unstable();
         extreme.dedup();
         let extreme: Vec<Point> = extreme.into_iter().map(|i| tree.points[i]).collect();
-        let (mut vertices, triangles) = quick::convex_hull(&extreme)?;
+        let (vertices, triangles) = quick::convex_hull(&extreme)?;
+        ConvexHull::grown(vertices, triangles, &tree, f64::INFINITY)
+    }
+
+    /// A polyhedron with outward triangles, grown about its middle until it holds `points`: by no more than this factor.
+    fn grown(
+        mut vertices: Vec<Point>,
+        triangles: Vec<[u32; 3]>,
+        points: &PointTree,
+        most: f64,
+    ) -> Result<Self, HullError> {
+        let size = points.size();
         let center = Point::from(vertices.iter().map(|v| v.coords).sum::<Vector>() / vertices.len() as f64);
         let mut scale: f64 = 1.0;
         for corners in &triangles {
-            let Some((a, normal)) = face(&vertices, corners, extent.norm()) else { continue };
+            let Some((a, normal)) = face(&vertices, corners, size) else { continue };
             let offset = normal.dot(&(a - center));
             if offset.is_nan() || offset <= 0.0 {
                 return Err(HullError::Failed { reason: "its middle lies outside a face".into() });
             }
-            scale = scale.max(tree.farthest(&normal, &center, offset).0 / offset);
+            scale = scale.max(points.farthest(&normal, &center, offset).0 / offset);
+        }
+        if scale > most {
+            return Err(HullError::Failed { reason: format!("it had to grow by a factor of {scale}") });
         }
         vertices.iter_mut().for_each(|v| *v = center + (*v - center) * (scale * (1.0 + 1e-9)));
-        ConvexHull::from_polyhedron(vertices, triangles, &tree)
+        ConvexHull::from_polyhedron(vertices, triangles, points)
     }
 
     /// Takes a polyhedron with outward triangles as hull of `points`, after verifying that it is one.
@@ -278,6 +299,11 @@ impl PointTree {
         tree.add(&mut points, 0);
         tree.points = points;
         tree
+    }
+
+    /// Length of the diagonal of the box around all points.
+    fn size(&self) -> f64 {
+        (self.nodes[0].high - self.nodes[0].low).norm()
     }
 
     fn add(&mut self, points: &mut [Point], first: usize) {
