@@ -9,7 +9,7 @@ pub use quick::convex_hull;
 
 use crate::frame::{Point, Vector};
 
-/// A convex polyhedron. Every point it was built from lies inside it within `1e-9` of its size.
+/// A convex polyhedron. Every point it was built from lies inside it within `1e-7` of its size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvexHull {
     vertices: Vec<Point>,

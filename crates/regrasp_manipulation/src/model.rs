@@ -122,27 +122,6 @@ pub struct Turn {
     pub body: usize,
 }
 
-/// The bodies of a pair that keeps the usual clearance whatever the fingers do; two equal numbers for a fingertip and the object.
-#[derive(Debug, Clone, Copy)]
-pub struct Usual([u16; 2]);
-
-impl Usual {
-    fn of(pair: &Pair) -> Self {
-        let numbers = [pair.a, pair.b].map(u16::try_from);
-        match (pair.tip_of, numbers) {
-            (None, [Ok(a), Ok(b)]) => Usual([a, b]),
-            _ => Usual([0, 0]),
-        }
-    }
-
-    /// The bodies; None where more than their distance decides.
-    #[inline]
-    pub fn bodies(self) -> Option<[usize; 2]> {
-        let [a, b] = self.0;
-        (a != b).then(|| [a.into(), b.into()])
-    }
-}
-
 /// The scene, prepared.
 #[derive(Debug)]
 pub struct Model<'a> {
@@ -158,8 +137,8 @@ pub struct Model<'a> {
     pub object: usize,
     /// Pairs to keep apart, in order, but for those with obstacles: every moving body is kept apart from each of these.
     pub pairs: Vec<Pair>,
-    /// The same pairs, in short.
-    pub usual: Vec<Usual>,
+    /// The bodies of each of these pairs, in short, where their distance alone decides; None for a fingertip and the object.
+    pub usual: Vec<Option<[u16; 2]>>,
     /// When the obstacles have their turn among these.
     pub turns: Vec<Turn>,
     /// Bounding balls of the obstacles, in the world.
@@ -312,7 +291,11 @@ impl<'a> Model<'a> {
             };
             finger.turns = turns.iter().filter(|turn| moves(turn.body)).map(among_its_own).collect();
         }
-        let usual = pairs.iter().map(Usual::of).collect();
+        let short = |pair: &Pair| match (pair.tip_of, u16::try_from(pair.a), u16::try_from(pair.b)) {
+            (None, Ok(a), Ok(b)) => Some([a, b]),
+            _ => None,
+        };
+        let usual = pairs.iter().map(short).collect();
         let friction = view.object.friction / settings.friction_margin;
         let others_may_hold = |away: usize| {
             let others: Vec<ContactModel> =

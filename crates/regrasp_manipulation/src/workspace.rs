@@ -26,7 +26,7 @@ pub mod tried;
 
 use crate::forces::limits::Refusals;
 use crate::grasp::state::{Contacts, GraspState, HandJoints};
-use crate::model::{Carrier, Model, Pair, Usual};
+use crate::model::{Carrier, Model, Pair};
 use crate::passing::{PassingOver, RrtRuns};
 use configuration::{Configuration, midway, place_finger, place_object};
 use draws::Draws;
@@ -400,16 +400,15 @@ impl<'a> Workspace<'a> {
     #[inline]
     fn pair_is_clear(&mut self, index: usize, mode: TipMode) -> bool {
         let model = self.model;
-        let Some(Some([a, b])) = model.usual.get(index).copied().map(Usual::bodies) else {
-            return self.near_pair_is_clear(index, mode);
-        };
+        let Some(&Some(bodies)) = model.usual.get(index) else { return self.near_pair_is_clear(index, mode) };
+        let [a, b] = bodies.map(usize::from);
         // Most pairs are far apart: of them nothing is looked at but their balls.
         let motion = self.motion[a] + self.motion[b];
         if self.slack[index] - motion > model.settings.clearance {
             self.slack[index] -= motion;
             return true;
         }
-        let between = (self.next.centers[a] - self.next.centers[b]).norm() - model.radii[a] - model.radii[b];
+        let between = self.between_balls(a, b);
         if between > model.settings.clearance + motion {
             self.slack[index] = between;
             return true;
@@ -417,7 +416,14 @@ impl<'a> Workspace<'a> {
         self.near_pair_is_clear(index, mode)
     }
 
-    /// The same for a pair that may be near.
+    /// Distance between the bounding balls of two bodies at `next`.
+    #[inline]
+    fn between_balls(&self, a: usize, b: usize) -> f64 {
+        let model = self.model;
+        (self.next.center(model, a) - self.next.center(model, b)).norm() - model.radii[a] - model.radii[b]
+    }
+
+    /// What [`Workspace::pair_is_clear`] says, of a pair that may be near.
     fn near_pair_is_clear(&mut self, index: usize, mode: TipMode) -> bool {
         let pair = self.pairs[index];
         // Obstacles do not move, and are never first.
@@ -451,8 +457,7 @@ impl<'a> Workspace<'a> {
     fn apart(&mut self, index: usize, required: f64, motion: f64) -> bool {
         let pair = self.pairs[index];
         let model = self.model;
-        let centers = self.next.center(model, pair.a) - self.next.center(model, pair.b);
-        let between = centers.norm() - model.radii[pair.a] - model.radii[pair.b];
+        let between = self.between_balls(pair.a, pair.b);
         if between > required + motion {
             self.slack[index] = between;
             return true;

@@ -19,7 +19,7 @@ use wide::f64x4;
 
 mod table;
 
-use table::{Block, LANES, MOST_BLOCKS, NormalTable, in_blocks, largest_of};
+use table::{Block, LANES, MOST_BLOCKS, NormalTable, along, in_blocks, largest_of, splat};
 
 /// The exponent `p`. Larger ones follow corners more closely, and are less even between them.
 const EXPONENT: i32 = 200;
@@ -192,7 +192,8 @@ impl SmoothHull {
     }
 }
 
-/// Calls `each` with every four points: the number of their block, themselves, `1 / s_i`, and `(s_i / max s)^p`. The largest `s_i`, and the sum of the powers.
+/// Calls `each` with every four points: the number of their block, themselves, `1 / s_i`, and `(s_i / max s)^p`. The largest `s_i`,
+/// and the sum of the powers.
 ///
 /// Nothing is multiplied and added at once, so that results are the same on every machine.
 #[inline]
@@ -213,17 +214,6 @@ fn powers<'a>(
         each(block, points, f64x4::ONE / s, power);
     }
     (largest, total(sum))
-}
-
-/// How far four points reach towards a direction.
-#[inline]
-fn along([x, y, z]: &Block, n: &Block) -> f64x4 {
-    *x * n[0] + *y * n[1] + *z * n[2]
-}
-
-#[inline]
-fn splat(v: &Vector) -> Block {
-    [f64x4::splat(v.x), f64x4::splat(v.y), f64x4::splat(v.z)]
 }
 
 /// The sum of four numbers, in an order that is the same on every machine.

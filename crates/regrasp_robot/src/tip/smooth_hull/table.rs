@@ -64,7 +64,7 @@ impl NormalTable {
         }));
     }
 
-    /// The blocks whose points may count towards `n`, each with its number: that of its first point, by four.
+    /// The blocks whose points may count towards `n`, each with its number: its first point's, divided by [`LANES`].
     #[inline]
     pub fn near(&self, n: &Vector) -> impl Iterator<Item = (usize, &Block)> + Clone {
         let size = n.abs();
@@ -83,17 +83,30 @@ fn count(blocks: &[Block], n: Vector, least_share: f64) -> u128 {
     // Directions tried are nowhere farther from each other than in the middle of a face, where a square of them is this wide.
     let sine = f64x4::splat(0.5 * std::f64::consts::SQRT_2 * 2.0 / GRID as f64);
     let n = n.normalize();
+    let n = splat(&n);
     // How far four points reach towards `n`, and how much farther or less far they may towards a direction near by.
-    let reach = |[x, y, z]: &Block| {
-        let along = *x * f64x4::splat(n.x) + *y * f64x4::splat(n.y) + *z * f64x4::splat(n.z);
-        let across = *x * *x + *y * *y + *z * *z - along * along;
-        (along, sine * across.fast_max(f64x4::ZERO).sqrt())
+    let reach = |points: &Block| {
+        let reach = along(points, &n);
+        let across = along(points, points) - reach * reach;
+        (reach, sine * across.fast_max(f64x4::ZERO).sqrt())
     };
     // Whatever the direction, the farthest point reaches at least as far as this one does.
-    let least = blocks.iter().map(reach).fold(f64x4::ZERO, |least, (along, spare)| least.fast_max(along - spare));
+    let least = blocks.iter().map(reach).fold(f64x4::ZERO, |least, (reach, spare)| least.fast_max(reach - spare));
     let listed = least_share * largest_of(least);
-    let counts = blocks.iter().map(reach).map(|(along, spare)| largest_of(along + spare) >= listed);
+    let counts = blocks.iter().map(reach).map(|(reach, spare)| largest_of(reach + spare) >= listed);
     counts.enumerate().fold(0, |all, (block, counts)| all | u128::from(counts) << block)
+}
+
+/// How far four points reach towards a direction.
+#[inline]
+pub fn along([x, y, z]: &Block, n: &Block) -> f64x4 {
+    *x * n[0] + *y * n[1] + *z * n[2]
+}
+
+/// A direction, for four points at once.
+#[inline]
+pub fn splat(v: &Vector) -> Block {
+    [f64x4::splat(v.x), f64x4::splat(v.y), f64x4::splat(v.z)]
 }
 
 /// The largest of four numbers and zero.
