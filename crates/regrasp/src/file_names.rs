@@ -1,4 +1,5 @@
-//! What a file that is written calls another one: a path within a package given, else one relative to itself.
+//! What a file that is written calls another one: its path from the folder of the writer for what is in there, else a path within a package
+//! given, else one relative to the writer.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -9,15 +10,19 @@ pub fn name_from(writer: &Path, file: &Path, packages: &[(String, PathBuf)]) -> 
     let absolute = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| elsewhere(path));
     let file = absolute(file);
     let slashed = |path: &Path| path.to_string_lossy().replace('\\', "/");
+    let folder = match writer.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => absolute(parent),
+        _ => absolute(Path::new(".")),
+    };
+    // Found without any option, also when the folder has moved.
+    if let Ok(inside) = file.strip_prefix(&folder) {
+        return slashed(inside);
+    }
     for (name, folder) in packages {
         if let Ok(inside) = file.strip_prefix(absolute(folder)) {
             return format!("package://{name}/{}", slashed(inside));
         }
     }
-    let folder = match writer.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => absolute(parent),
-        _ => absolute(Path::new(".")),
-    };
     slashed(&relative(&file, &folder))
 }
 
@@ -42,6 +47,23 @@ mod tests {
         let seen = |target: &str, folder: &str| relative(Path::new(target), Path::new(folder));
         assert_eq!(seen("/a/b/hand.urdf", "/a/b"), PathBuf::from("hand.urdf"));
         assert_eq!(seen("/a/b/hand.urdf", "/a/c/d"), PathBuf::from("../../b/hand.urdf"));
+    }
+
+    /// What lies with the writer is found without any option; what lies elsewhere is named by its package.
+    #[test]
+    fn files_beside_the_writer_are_named_without_their_package() {
+        let folder = tempfile::tempdir().unwrap();
+        let packages = [("models".to_owned(), folder.path().to_owned())];
+        let seen = |writer: &str| {
+            let file = folder.path().join("leap/hand.urdf");
+            name_from(&folder.path().join(writer), &file, &packages)
+        };
+        std::fs::create_dir_all(folder.path().join("leap")).unwrap();
+        std::fs::create_dir_all(folder.path().join("other")).unwrap();
+        std::fs::write(folder.path().join("leap/hand.urdf"), "").unwrap();
+        assert_eq!(seen("leap/hand.toml"), "hand.urdf");
+        assert_eq!(seen("robot.toml"), "leap/hand.urdf");
+        assert_eq!(seen("other/hand.toml"), "package://models/leap/hand.urdf");
     }
 
     /// As seen from the folder of the scene, and not as it was typed in another one.
