@@ -14,8 +14,10 @@ pub struct Link {
     pub name: String,
     /// Collision geometry, placed in the link frame. Meshes are kept as read.
     pub collision: Vec<PlacedShape>,
-    /// What it looks like: for pictures only, never looked at in planning.
+    /// What it looks like: for pictures, and never looked at in planning.
     pub visual: Vec<Visual>,
+    /// True when [`Self::collision`] was read from the visual elements, because the link has no collision elements.
+    pub collision_from_visuals: bool,
     /// The joint that carries this link; none for the root.
     pub parent_joint: Option<JointId>,
 }

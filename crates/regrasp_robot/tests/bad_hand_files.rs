@@ -88,7 +88,7 @@ refused!(
     a_key_that_is_misspelt,
     format!("basse_link = \"palm\"\n{}", with_finger(&format!("tip_link = \"a_tip\"\n{POINT}\ncolour = 1"))),
     [
-        r#"U201 hand.toml:1:1 key "basse_link": is not a key that exists here; expected format, format_version, urdf, srdf, base_link, allow, couplings, held, without_geometry or fingers
+        r#"U201 hand.toml:1:1 key "basse_link": is not a key that exists here; expected format, format_version, urdf, srdf, base_link, allow, couplings, held, without_geometry, collision_from_visuals or fingers
   fix: did you mean base_link?"#,
         r#"U201 hand.toml:10:1 key "fingers[0].colour": is not a key that exists here; expected name, tip_link, first_joint, tip, pad, contact, torsion_radius or rest"#
     ]

@@ -132,7 +132,10 @@ fn links_that_are_drawn_and_have_no_collision_geometry_are_named() {
     };
     assert_eq!(
         said(&(cover + &fingers)),
-        ["links that are drawn but have no collision geometry, so that plans do not keep clear of them: \"cover\""]
+        [
+            "links that are drawn but have no collision geometry, so that plans do not keep clear of them (unless `collision_from_visuals` in the \
+          hand file names them): \"cover\""
+        ]
     );
     assert_eq!(said(&fingers), [""; 0]);
 }

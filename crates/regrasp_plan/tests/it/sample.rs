@@ -48,7 +48,13 @@ fn robot() -> Robot {
     };
     let mut robot = Robot {
         name: "sample".into(),
-        links: vec![Link { name: "palm".into(), collision: vec![palm], visual: Vec::new(), parent_joint: None }],
+        links: vec![Link {
+            name: "palm".into(),
+            collision: vec![palm],
+            visual: Vec::new(),
+            collision_from_visuals: false,
+            parent_joint: None,
+        }],
         joints: Vec::new(),
         root: LinkId(0),
     };
@@ -79,7 +85,13 @@ fn robot() -> Robot {
             });
             let joint = JointId(robot.joints.len());
             let name = format!("f{f}_l{j}");
-            robot.links.push(Link { name, collision, visual: Vec::new(), parent_joint: Some(joint) });
+            robot.links.push(Link {
+                name,
+                collision,
+                visual: Vec::new(),
+                collision_from_visuals: false,
+                parent_joint: Some(joint),
+            });
             robot.joints.push(Joint {
                 name: format!("f{f}_j{j}"),
                 kind,

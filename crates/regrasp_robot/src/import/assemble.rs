@@ -112,14 +112,15 @@ fn drawn_only_note(robot: &Robot, spec: &HandSpec, links: impl Iterator<Item = L
         links.filter(is_drawn_only).map(|link| format!("\"{}\"", robot.links[link.0].name)).collect();
     (!drawn.is_empty()).then(|| {
         format!(
-            "links that are drawn but have no collision geometry, so that plans do not keep clear of them: {}",
+            "links that are drawn but have no collision geometry, so that plans do not keep clear of them (unless `collision_from_visuals` \
+             in the hand file names them): {}",
             some_of(&drawn)
         )
     })
 }
 
 /// The first of `names`, and how many more there are.
-fn some_of(names: &[String]) -> String {
+pub(crate) fn some_of(names: &[String]) -> String {
     let more = match names.len().saturating_sub(MOST_NAMED) {
         0 => String::new(),
         n => format!(" and {n} more"),

@@ -11,11 +11,12 @@ use super::shared_motors;
 use super::spec::{FingerSpec, HandSpec, PadSpec, TipSpec, leave_geometry_out};
 use super::srdf::{LoadedSrdf, load_srdf};
 use super::ties;
-use super::urdf::{LoadedRobot, load_robot};
+use super::urdf::{LoadedRobot, load_robot, load_robot_with};
 use crate::contact_model::{self, ContactModel};
 use crate::hand::{Hand, MAX_FINGERS};
+use crate::inspect::drawn::{drawn_links, read_again};
 use crate::inspect::enclosing::LARGEST_RADIUS;
-use crate::inspect::guess::leave_out_what_blocks;
+use crate::inspect::guess::{guess_hand, leave_out_what_blocks};
 use crate::robot::{JointId, LinkId, Robot};
 use nalgebra::{Quaternion, UnitQuaternion};
 use regrasp_base::diagnostic::did_you_mean;
@@ -86,10 +87,19 @@ fn load_bare_urdf(path: &Path, options: &LoadOptions) -> Result<LoadedHand, Inpu
 }
 
 fn guessed_parts(path: &Path, options: &LoadOptions) -> Result<HandParts, InputError> {
-    let LoadedRobot { robot, inputs, mut notes } = load_robot(path, options)?;
+    let mut loaded = load_robot(path, options)?;
     options.check_time(path)?;
+    let mut spec = guess_hand(&loaded.robot, options, path)?;
+    // One finger alone is an arm.
+    if spec.fingers.len() > 1 {
+        let drawn = drawn_links(&loaded.robot, &[spec.base]);
+        if !drawn.is_empty() {
+            loaded = read_again(loaded, &drawn, (path, options))?;
+            spec = guess_hand(&loaded.robot, options, path)?;
+        }
+    }
+    let LoadedRobot { robot, inputs, mut notes } = loaded;
     let robot = Arc::new(robot);
-    let spec = crate::inspect::guess::guess_hand(&robot, options, path)?;
     notes.push(format!(
         "{}: fingers and tips were guessed; `regrasp inspect -o hand.toml` writes them down",
         path.display()
@@ -220,11 +230,15 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     let couplings = root.optional("couplings");
     let held = root.optional("held");
     let without_geometry = root.optional("without_geometry");
+    let from_visuals = root.optional("collision_from_visuals");
     let inspect = fixes::inspect_command(urdf.as_ref().and_then(Entry::as_text), path);
     let fingers = root.required(found, "fingers", &inspect);
     root.finish(found);
     // Without a robot no name in the rest of the file can be looked up.
-    let (mut robot, mut inputs) = urdf.and_then(|entry| locate_and_load(&entry, path, options, found))?;
+    let from_visuals = from_visuals.and_then(|entry| entry.entries(found, "a list of links")).unwrap_or_default();
+    let names = from_visuals.iter().filter_map(Entry::as_text).map(Into::into).collect();
+    let (mut robot, mut inputs) = urdf.and_then(|entry| locate_and_load(&entry, path, options, &names, found))?;
+    from_visuals.iter().for_each(|link| refuse_unless_from_visuals(link, &robot, found));
     if let Some(entry) = couplings {
         couplings::read(&entry, &mut robot, found);
     }
@@ -245,6 +259,21 @@ fn read(mut root: Table, path: &Path, options: &LoadOptions, found: &mut Found) 
     let held = held.map_or_else(BTreeMap::new, |entry| read_held(&entry, &robot, found));
     let spec = HandSpec { base, fingers, mount: None, allow, held, without_geometry };
     Some(Parts { robot, spec, inputs })
+}
+
+/// Refuses an entry of `collision_from_visuals` whose link has other geometry (`U213`), or no such link (`U205`).
+fn refuse_unless_from_visuals(entry: &Entry, robot: &Robot, found: &mut Found) {
+    let Some(link) = known_link(entry, robot, found).map(|link| &robot.links[link.0]) else { return };
+    if !link.collision_from_visuals {
+        let problem = match link.visual.is_empty() && link.collision.is_empty() {
+            true => format!("link \"{}\" has no visual geometry", link.name),
+            false => format!("link \"{}\" has collision geometry of its own", link.name),
+        };
+        let diagnostic = entry.error("U213", found, problem);
+        found.diagnostics.push(
+            diagnostic.expected("a link with <visual> elements and no <collision>").fix("take the link off the list"),
+        );
+    }
 }
 
 /// Positions of joints that belong to no finger.
@@ -295,14 +324,16 @@ pub(super) fn locate(entry: &Entry, path: &Path, options: &LoadOptions, found: &
     }
 }
 
+/// The robot of the URDF that `entry` names; `from_visuals` is that of [`load_robot_with`].
 pub(super) fn locate_and_load(
     entry: &Entry,
     path: &Path,
     options: &LoadOptions,
+    from_visuals: &BTreeSet<String>,
     found: &mut Found,
 ) -> Option<(Robot, Vec<LoadedInput>)> {
     let urdf = locate(entry, path, options, found)?;
-    match load_robot(&urdf, options) {
+    match load_robot_with(&urdf, options, from_visuals) {
         Ok(mut loaded) => {
             if let (Some(first), Some(name)) = (loaded.inputs.first_mut(), entry.as_text()) {
                 name.clone_into(&mut first.name);

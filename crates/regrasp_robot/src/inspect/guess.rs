@@ -191,7 +191,7 @@ const STAND_IN: f64 = 0.002;
 
 /// Moving joints below which nothing moves, in document order; not those of fingers without any geometry, or with nothing but stand-ins
 /// for it, unless no finger has any.
-fn last_moving_joints(robot: &Robot) -> Vec<JointId> {
+pub(super) fn last_moving_joints(robot: &Robot) -> Vec<JointId> {
     let last_joints = all_last_moving_joints(robot);
     let path = |last: &JointId| robot.joints_to(robot.joints[last.0].child);
     let paths: Vec<Vec<JointId>> = last_joints.iter().map(path).collect();

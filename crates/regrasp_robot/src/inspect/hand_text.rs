@@ -57,6 +57,18 @@ pub fn hand_file_text(hand: &Hand, urdf: &str, allow: &BTreeSet<(LinkId, LinkId)
             links.join(", ")
         );
     }
+    let path = |link: LinkId| robot.joints_to(link);
+    let is_of_hand =
+        |link: LinkId| path(link).starts_with(&path(hand.base)) || path(hand.base).starts_with(&path(link));
+    let drawn = (0..robot.links.len()).map(LinkId).filter(|id| robot.links[id.0].collision_from_visuals);
+    let drawn: Vec<String> = drawn.filter(|&id| is_of_hand(id)).map(name).collect();
+    if !drawn.is_empty() {
+        let _ = writeln!(
+            text,
+            "\n# Links without collision geometry; their visuals stand for it.\ncollision_from_visuals = [{}]",
+            drawn.join(", ")
+        );
+    }
     if !hand.held.is_empty() {
         let _ = writeln!(text, "\n# Joints that belong to no finger, and where they are held.\n[held]");
         for &(joint, position) in &hand.held {

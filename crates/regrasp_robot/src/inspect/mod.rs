@@ -2,6 +2,8 @@
 
 /// Links of one finger that are always near each other.
 pub(crate) mod crowded;
+/// Fingertips that are drawn and have no collision geometry.
+pub(crate) mod drawn;
 /// Collision geometry that encloses the fingers.
 pub(crate) mod enclosing;
 /// Names of fingers.

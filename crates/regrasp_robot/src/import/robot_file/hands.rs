@@ -144,6 +144,7 @@ fn read_hand(
             refuse_other_urdf(&file_entry, &parts, &draft.models[model].sha256, found)?;
             take_couplings(&file_entry, &mut draft.tree, &parts, &place, found)?;
             refuse_base_elsewhere(&file_entry, &draft.tree, mount, place.link(parts.spec.base), found)?;
+            take_visuals(&mut draft.tree, &parts.robot, &place);
             place
         }
     };
@@ -202,6 +203,17 @@ fn take_couplings(entry: &Entry, tree: &mut Robot, parts: &HandParts, place: &Pl
         of_tree.coupling = Some(coupling);
     }
     Some(())
+}
+
+/// Gives links of the tree that have no collision geometry what stands for it in the hand file's robot.
+fn take_visuals(tree: &mut Robot, robot: &Robot, place: &Place) {
+    for (index, link) in robot.links.iter().enumerate().filter(|(_, link)| link.collision_from_visuals) {
+        let of_tree = &mut tree.links[place.link(LinkId(index)).0];
+        if of_tree.collision.is_empty() {
+            of_tree.collision.clone_from(&link.collision);
+            of_tree.collision_from_visuals = true;
+        }
+    }
 }
 
 fn refuse_base_elsewhere(entry: &Entry, tree: &Robot, mount: LinkId, base: LinkId, found: &mut Found) -> Option<()> {

@@ -39,7 +39,13 @@ impl Place {
 
 /// A tree of one link without geometry, for robots to be mounted on.
 pub(super) fn empty(name: &str) -> Robot {
-    let root = Link { name: "root".into(), collision: Vec::new(), visual: Vec::new(), parent_joint: None };
+    let root = Link {
+        name: "root".into(),
+        collision: Vec::new(),
+        visual: Vec::new(),
+        collision_from_visuals: false,
+        parent_joint: None,
+    };
     Robot { name: name.to_owned(), links: vec![root], joints: Vec::new(), root: LinkId(0) }
 }
 

@@ -120,7 +120,7 @@ fn read_model(mut table: Table, path: &Path, options: &LoadOptions, found: &mut 
     };
     let pose = read_pose(&mut table, found);
     table.finish(found);
-    let (mut robot, mut inputs) = locate_and_load(&urdf?, path, options, found)?;
+    let (mut robot, mut inputs) = locate_and_load(&urdf?, path, options, &BTreeSet::new(), found)?;
     if let Some(entry) = &spheres {
         inputs.extend(spheres::replace(entry, &mut robot, path, options, found));
     }

@@ -6,6 +6,7 @@ use crate::robot::Robot;
 use regrasp_base::diagnostic::did_you_mean;
 use regrasp_base::toml_table::{Entry, Found};
 use regrasp_geometry::Shape;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Replaces the collision geometry of links by the balls that the URDF of `entry` has for them. Links that it has no balls for keep their
@@ -19,7 +20,7 @@ pub(super) fn replace(
     options: &LoadOptions,
     found: &mut Found,
 ) -> Option<LoadedInput> {
-    let (model, mut inputs) = locate_and_load(entry, path, options, found)?;
+    let (model, mut inputs) = locate_and_load(entry, path, options, &BTreeSet::new(), found)?;
     let mut n_balls = 0;
     for link in model.links.iter().filter(|link| !link.collision.is_empty()) {
         let Some(own) = robot.link_named(&link.name) else {

@@ -8,6 +8,7 @@ use regrasp_base::{Diagnostic, InputError};
 use regrasp_geometry::shape::PlacedShape;
 use regrasp_geometry::{Pose, Shape, TriangleMesh, Vector};
 use roxmltree::Node;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Tags of geometry that are read.
@@ -30,18 +31,34 @@ pub(super) fn read_origin(reader: &mut Reader, node: Node, element: Named) -> Op
     Some(Pose::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw)))
 }
 
-/// The collision geometry of the link at `node`; problems go to the reader.
-pub(super) fn read_collisions(reader: &mut Reader, node: Node, link: &str, meshes: &mut Meshes) -> Vec<PlacedShape> {
+/// The elements that the collision geometry of the link at `node` is made of: its collisions, or where it has none and `from_visuals` names it,
+/// its visuals.
+pub(super) fn elements<'a, 'i>(node: Node<'a, 'i>, from_visuals: &BTreeSet<String>) -> Vec<Node<'a, 'i>> {
+    let collisions: Vec<Node> = children(node, "collision").collect();
+    let is_named = || node.attribute("name").is_some_and(|name| from_visuals.contains(name));
+    if collisions.is_empty() && is_named() { children(node, "visual").collect() } else { collisions }
+}
+
+/// The geometry of `elements` of a link, collisions or visuals; problems go to the reader.
+pub(super) fn read_collisions(
+    reader: &mut Reader,
+    elements: &[Node],
+    link: &str,
+    meshes: &mut Meshes,
+) -> Vec<PlacedShape> {
     let element = ("link", link);
     let mut placed = Vec::new();
-    for collision in children(node, "collision") {
-        reader.note_misspelt_children(collision, &["origin", "geometry"], element);
+    for &collision in elements {
+        let tag = collision.tag_name().name();
+        let known: &[&str] =
+            if tag == "visual" { &["origin", "geometry", "material"] } else { &["origin", "geometry"] };
+        reader.note_misspelt_children(collision, known, element);
         let parent_from_shape = read_origin(reader, collision, element);
         let shape = match child(collision, "geometry") {
             Some(geometry) => read_shape(reader, geometry, element, meshes),
             None => {
                 let place = reader.place(collision);
-                let problem = "<collision> has no <geometry>";
+                let problem = format!("<{tag}> has no <geometry>");
                 drop_or_refuse(reader, collision, element, Diagnostic::new("U150", place, problem).into());
                 None
             }

@@ -1,6 +1,7 @@
 //! URDF. Form: <http://wiki.ros.org/urdf/XML>, with the `<capsule>` of URDF 1.2 (`length` is that of the cylinder).
 //!
-//! Read: links with collision geometry, joints, limits, couplings; of visuals which they are, and no file that they name.
+//! Read: links with collision geometry, joints, limits, couplings; of visuals which they are, and no file that they name
+//! unless they stand for the collision geometry of a link that has none.
 //! Not read: inertia, transmissions, sensors.
 //! Every problem of a file is reported in one run.
 
@@ -20,7 +21,7 @@ use regrasp_base::diagnostic::{Lines, bad_name};
 use regrasp_base::{Diagnostic, InputError, files};
 use regrasp_geometry::TriangleMesh;
 use regrasp_geometry::import::{MAX_TRIANGLES, too_many};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -46,21 +47,30 @@ pub struct LoadedRobot {
 ///
 /// Errors: every problem of the file and its meshes (`U1xx`, `V001`, `M2xx`), or `F00x` when it cannot be read.
 pub fn load_robot(path: &Path, options: &LoadOptions) -> Result<LoadedRobot, InputError> {
+    load_robot_with(path, options, &BTreeSet::new())
+}
+
+/// As [`load_robot`]; the visuals of links called as `from_visuals` says stand for their collision geometry where they have none.
+pub(crate) fn load_robot_with(
+    path: &Path,
+    options: &LoadOptions,
+    from_visuals: &BTreeSet<String>,
+) -> Result<LoadedRobot, InputError> {
     let bytes = options.read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let input = LoadedInput { role: "urdf".into(), name, path: path.to_owned(), sha256: files::sha256(&bytes) };
     let text = files::text_of(path, bytes)?;
     let mut meshes =
         Meshes { options: options.clone(), read: BTreeMap::new(), n_triangles: 0, n_missed: 0, inputs: vec![input] };
-    let (robot, notes) = parse_robot(path, &text, options.lenient, &mut meshes)?;
+    let (robot, notes) = parse_robot(path, &text, (options.lenient, from_visuals), &mut meshes)?;
     Ok(LoadedRobot { robot, inputs: meshes.inputs, notes })
 }
 
-/// Reads `text`, the content of the URDF file `path`.
-pub(crate) fn parse_robot(
+/// Reads `text`, the content of the URDF file `path`. `from_visuals` is that of [`load_robot_with`].
+fn parse_robot(
     path: &Path,
     text: &str,
-    lenient: bool,
+    (lenient, from_visuals): (bool, &BTreeSet<String>),
     meshes: &mut Meshes,
 ) -> Result<(Robot, Vec<String>), InputError> {
     let document = parse(path, text)?;
@@ -74,9 +84,9 @@ pub(crate) fn parse_robot(
         reader.found.push(diagnostic);
     }
 
-    let mut collisions = children(root, "link").flat_map(|link| children(link, "collision"));
+    let mut collisions = children(root, "link").flat_map(|link| geometry::elements(link, from_visuals));
     if let Some(node) = collisions.nth(MAX_COLLISIONS) {
-        let problem = format!("has more than {MAX_COLLISIONS} <collision> elements");
+        let problem = format!("has more than {MAX_COLLISIONS} <{}> elements", node.tag_name().name());
         return Err(Diagnostic::new("U105", reader.place(node), problem).into());
     }
     let mut links = Vec::new();
@@ -88,9 +98,12 @@ pub(crate) fn parse_robot(
             return Err(Diagnostic::new("U105", place, format!("has more than {MAX_LINKS} links")).into());
         }
         reader.note_misspelt_children(node, &["inertial", "visual", "collision"], ("link", link_name));
-        let collision = geometry::read_collisions(&mut reader, node, link_name, meshes);
+        let elements = geometry::elements(node, from_visuals);
+        let collision_from_visuals = elements.first().is_some_and(|element| element.has_tag_name("visual"));
+        let collision = geometry::read_collisions(&mut reader, &elements, link_name, meshes);
         let visual = visual::read_visuals(path, &lines, node, link_name);
-        links.push(Link { name: link_name.to_owned(), collision, visual, parent_joint: None });
+        let name = link_name.to_owned();
+        links.push(Link { name, collision, visual, collision_from_visuals, parent_joint: None });
         link_nodes.push(node);
     }
     if links.is_empty() {

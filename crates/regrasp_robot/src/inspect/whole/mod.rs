@@ -7,14 +7,15 @@ mod text;
 /// Links that touch.
 mod touch;
 
+use super::drawn::{drawn_links, read_again};
 use super::guess::{guess_hand, leave_out_what_blocks};
 use super::{InspectSettings, PairTable};
 use crate::hand::Hand;
 use crate::import::assemble::assemble;
 use crate::import::spec::{HandSpec, leave_geometry_out};
 use crate::import::srdf::LoadedSrdf;
-use crate::import::{LoadOptions, srdf::load_srdf};
-use crate::robot::Robot;
+use crate::import::{LoadOptions, LoadedRobot, srdf::load_srdf};
+use crate::robot::{LinkId, Robot};
 pub use guess::{ArmGuess, HandGuess, RobotGuess, guess_robot};
 use regrasp_base::{Diagnostic, InputError, Place, Rng};
 use std::collections::BTreeSet;
@@ -63,12 +64,23 @@ pub fn inspect_whole(
     if guess.arms.is_empty() {
         return Ok(None);
     }
+    let bases: Vec<LinkId> = guess.hands.iter().map(|hand| hand.base).collect();
+    let drawn = drawn_links(&robot, &bases);
+    let (robot, mut notes) = match drawn.is_empty() || bases.is_empty() {
+        true => (robot, Vec::new()),
+        false => {
+            let loaded = LoadedRobot { robot: (*robot).clone(), inputs: Vec::new(), notes: Vec::new() };
+            let LoadedRobot { robot, mut notes, .. } = read_again(loaded, &drawn, (file, options))?;
+            // The others have been said.
+            (Arc::new(robot), notes.pop().into_iter().collect())
+        }
+    };
     let guessed = |guess: &HandGuess| {
         let base = Some(robot.links[guess.base.0].name.clone());
         guess_hand(&robot, &LoadOptions { base, ..options.clone() }, file)
     };
     let mut specs: Vec<Result<HandSpec, InputError>> = guess.hands.iter().map(guessed).collect();
-    let (mut cleared, mut notes) = ((*robot).clone(), Vec::new());
+    let mut cleared = (*robot).clone();
     for spec in specs.iter_mut().flatten() {
         // With what the mount link carries rigidly, which is the arm's otherwise.
         let Ok((hand, _)) = assemble(&robot, spec, file) else { continue };
