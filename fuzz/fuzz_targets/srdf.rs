@@ -3,8 +3,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use regrasp::robot::Robot;
-use regrasp::robot::import::srdf::load_srdf;
 use regrasp::robot::import::load_robot;
+use regrasp::robot::import::srdf::load_srdf;
 use regrasp_fuzz::{Folder, options};
 use std::sync::LazyLock;
 

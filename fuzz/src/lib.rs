@@ -1,7 +1,8 @@
 //! What the fuzz targets share: a folder with a small good hand, scene and mesh, one file of which is replaced per input.
 
+use regrasp::geometry::import::read_mesh;
 use regrasp::robot::import::LoadOptions;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A small good hand: palm and four one-joint fingers.
 pub const URDF: &str = include_str!("../seeds/urdf/hand.urdf");
@@ -48,4 +49,12 @@ impl Default for Folder {
 /// Lenient on every other input, by its length, so that both ways are tried.
 pub fn options(bytes: &[u8]) -> LoadOptions {
     LoadOptions { lenient: bytes.len() % 2 == 1, ..LoadOptions::default() }
+}
+
+/// Reads `bytes` as the mesh file `name`, and asks of the mesh all that is asked afterwards.
+pub fn ask_mesh(name: &str, bytes: &[u8]) {
+    if let Ok(mesh) = read_mesh(Path::new(name), bytes) {
+        assert!(mesh.vertices().iter().all(|vertex| vertex.coords.iter().all(|x| x.is_finite())));
+        let _ = (mesh.bounds(), mesh.signed_volume(), mesh.statistics().is_watertight());
+    }
 }

@@ -32,7 +32,7 @@ pub fn checker(_: &[String]) -> Outcome {
 /// Every fuzz target, `FUZZ_RUNS` runs each. Inputs go through files: in memory where the system has such a folder.
 pub fn fuzz(targets: &[String]) -> Outcome {
     let all = words(
-        "urdf srdf hand_toml robot_toml scene_toml stl obj plan_json roadmap robot_roadmap grasps_json isaac_grasps run_json",
+        "urdf srdf hand_toml robot_toml scene_toml stl obj ply dae glb plan_json roadmap robot_roadmap grasps_json isaac_grasps run_json",
     );
     let runs = number("FUZZ_RUNS", 1_000_000)?;
     for target in if targets.is_empty() { &all } else { targets } {

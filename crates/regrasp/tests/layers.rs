@@ -156,7 +156,7 @@ const TOWER: &[Floor] = &[
 const PRIVATE: &[(&str, &[&str])] = &[
     ("parry3d-f64", &["regrasp_geometry"]),
     // The viewer reads its own pictures back, in tests.
-    ("roxmltree", &["regrasp_robot", "regrasp_viewer"]),
+    ("roxmltree", &["regrasp_geometry", "regrasp_robot", "regrasp_viewer"]),
     ("clap", &["regrasp_cli"]),
     ("ctrlc", &["regrasp_cli"]),
     ("pyo3", &["regrasp_python"]),

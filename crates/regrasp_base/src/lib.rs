@@ -11,6 +11,8 @@ pub mod diagnostic;
 pub mod files;
 /// Where a value stands in a JSON text.
 pub mod json_place;
+/// XML that no parser should see.
+pub mod markup;
 /// Random numbers keyed by (seed, purpose, index).
 pub mod random;
 /// TOML tables read strictly, with the place of every key and value.

@@ -8,7 +8,7 @@ pub mod collision;
 pub mod frame;
 /// Convex hulls with adjacency, for support queries.
 pub mod hull;
-/// Readers of mesh files: STL and OBJ.
+/// Readers of mesh files: STL, OBJ, PLY, COLLADA and binary glTF.
 pub mod import;
 /// Volume, centre of mass and inertia of solids.
 pub mod mass;

@@ -1,13 +1,19 @@
-//! Readers of mesh files: STL and OBJ.
+//! Readers of mesh files: STL, OBJ, PLY, COLLADA and binary glTF.
 //!
 //! Readers take bytes and the name they came under, never open files, and never panic, whatever the bytes. Codes: M200
 //! unknown kind of file, M202 nothing in it, M203 numbers that are not finite, M204 encoding, M220 too large, M230
-//! binary STL, M231 ASCII STL, M240 OBJ statements, M241 OBJ indices.
+//! binary STL, M231 ASCII STL, M240 OBJ statements, M241 indices of vertices, M250 PLY, M260 COLLADA, M270 glTF.
 
+mod dae;
+mod glb;
 mod obj;
+mod placed;
+mod ply;
 mod polygon;
 mod stl;
 
+#[cfg(test)]
+mod placed_tests;
 #[cfg(test)]
 mod tests;
 
@@ -17,26 +23,35 @@ use regrasp_base::diagnostic::{Diagnostics, printable};
 use regrasp_base::{Diagnostic, InputError, Place};
 use std::path::Path;
 
+pub use dae::read_dae;
+pub use glb::read_glb;
 pub use obj::read_obj;
+pub use ply::read_ply;
 pub use stl::read_stl;
+
+/// What is said where another format is given.
+const FORMATS: &str = "an .stl, .obj, .ply, .dae or .glb file";
 
 /// Most triangles that are read from a file. A planner and a checker need about half a kilobyte for each.
 pub const MAX_TRIANGLES: usize = 1_500_000;
 
-/// Reads an STL or OBJ file, told apart by the extension of `path` in upper or lower case.
+/// Reads a mesh file of the format that the extension of `path` says, in upper or lower case.
 ///
-/// Errors: those of [`read_stl`] and [`read_obj`], and M200 for any other extension.
+/// Errors: those of [`read_stl`], [`read_obj`], [`read_ply`], [`read_dae`] and [`read_glb`], and M200 for any other extension.
 pub fn read_mesh(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     match extension.as_str() {
         "stl" => read_stl(path, bytes),
         "obj" => read_obj(path, bytes),
+        "ply" => read_ply(path, bytes),
+        "dae" => read_dae(path, bytes),
+        "glb" => read_glb(path, bytes),
         "" => Err(Diagnostic::new("M200", Place::file(path), "has no extension that says its format")
-            .expected("an .stl or .obj file")
+            .expected(FORMATS)
             .into()),
         _ => {
             Err(Diagnostic::new("M200", Place::file(path), format!("\".{extension}\" is not a mesh format read here"))
-                .expected("an .stl or .obj file")
+                .expected(FORMATS)
                 .fix("convert it, e.g. with trimesh: trimesh.load(\"FILE\").export(\"FILE.obj\")")
                 .into())
         }

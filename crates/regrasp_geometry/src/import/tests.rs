@@ -106,7 +106,7 @@ fn faulty_stl_is_refused_with_its_place() {
     assert_eq!(faults(stl(&text.as_bytes()[..text.len() - 25])).len(), 1);
     assert_eq!(faults(stl(b"solid nothing\nendsolid\n")), [("M202", None)]);
     assert_eq!(faults(stl(b"\xff\xfes\0o\0l\0i\0d\0")), [("M204", None)]);
-    assert_eq!(faults(read_mesh(Path::new("a.dae"), b"<x/>")), [("M200", None)]);
+    assert_eq!(faults(read_mesh(Path::new("a.3ds"), b"<x/>")), [("M200", None)]);
 }
 
 #[test]

@@ -2,18 +2,11 @@
 
 use super::other_form::{self, is_xacro_name};
 use regrasp_base::diagnostic::{Diagnostics, Lines, bad_name};
+use regrasp_base::markup::{Hostile, MAX_NODES, refuse_hostile};
 use regrasp_base::{Diagnostic, InputError, Place};
 use roxmltree::Node;
 use std::path::Path;
 
-/// Most XML nodes in a file.
-const MAX_NODES: u32 = 1_000_000;
-/// Deepest nesting of elements; URDF and SRDF need 6.
-const MAX_DEPTH: usize = 64;
-/// Most attributes of an element; URDF needs 4. The parser compares each with all others.
-const MAX_ATTRIBUTES: usize = 256;
-/// Most declarations of name spaces in a file; the parser compares each with all others.
-const MAX_NAMESPACES: usize = 1_000;
 /// Remarks about one file that are told one by one; the others are counted.
 const MAX_NOTES: usize = 100;
 
@@ -24,7 +17,10 @@ pub(crate) fn parse<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Documen
     if text.trim().is_empty() {
         return Err(Diagnostic::new("U100", Place::file(file), "is empty").into());
     }
-    refuse_hostile_markup(file, text)?;
+    refuse_hostile(text).map_err(|hostile| match hostile {
+        Hostile::Doctype { offset } => dtd(Place::at_offset(file, text, offset)),
+        Hostile::Excess { offset, problem } => Diagnostic::new("U105", Place::at_offset(file, text, offset), problem),
+    })?;
     let options = roxmltree::ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..Default::default() };
     roxmltree::Document::parse_with_options(text, options).map_err(|error| {
         let at = error.pos();
@@ -42,7 +38,7 @@ pub(crate) fn parse<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Documen
                 let extension = file.extension().and_then(|extension| extension.to_str()).unwrap_or("").to_lowercase();
                 let fix = match extension.as_str() {
                     _ if is_xacro => other_form::xacro_command(file),
-                    "obj" | "stl" | "ply" | "off" | "dae" => {
+                    "obj" | "stl" | "ply" | "off" | "dae" | "glb" => {
                         "this looks like a mesh: give the URDF of a hand; objects come after it, as in regrasp place HAND OBJECT"
                             .to_owned()
                     }
@@ -53,97 +49,6 @@ pub(crate) fn parse<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Documen
         }
         .into()
     })
-}
-
-/// What the markup of a file has been found to hold so far.
-#[derive(Default)]
-struct Markup {
-    depth: usize,
-    n_namespaces: usize,
-}
-
-/// Walks over the markup without a tree, so that nothing that costs the parser more than its bytes reaches it: deep nesting,
-/// elements of thousands of attributes, thousands of name spaces. Where the markup is broken it stops; the parser says why.
-fn refuse_hostile_markup(file: &Path, text: &str) -> Result<(), InputError> {
-    let after = |from: usize, end: &str| text.get(from..)?.find(end).map(|k| from + k + end.len());
-    let mut markup = Markup::default();
-    let mut at = 0;
-    while let Some(open) = after(at, "<").map(|end| end - 1) {
-        let rest = &text[open..];
-        // Quotes mean nothing in comments, character data and processing instructions, nor in closing tags.
-        let end = if rest.starts_with("<!--") {
-            after(open + 4, "-->")
-        } else if rest.starts_with("<![CDATA[") {
-            after(open + 9, "]]>")
-        } else if rest.starts_with("<?") {
-            after(open + 2, "?>")
-        } else if rest.starts_with("<!DOCTYPE") {
-            return Err(dtd(Place::at_offset(file, text, open)).into());
-        } else if rest.starts_with("<!") {
-            None
-        } else if rest.starts_with("</") {
-            markup.depth = markup.depth.saturating_sub(1);
-            after(open + 2, ">")
-        } else {
-            let end = markup.open_tag(text.as_bytes(), open);
-            if let Some(problem) =
-                markup.excess(text.as_bytes().get(open..end.unwrap_or(text.len())).unwrap_or_default())
-            {
-                return Err(Diagnostic::new("U105", Place::at_offset(file, text, open), problem).into());
-            }
-            end
-        };
-        let Some(end) = end else { return Ok(()) };
-        at = end;
-    }
-    Ok(())
-}
-
-impl Markup {
-    /// Index after the `>` that ends the tag which opens at `open`; quoted values may contain `>`. None where there is no end.
-    fn open_tag(&mut self, bytes: &[u8], open: usize) -> Option<usize> {
-        let mut quote = None;
-        let mut end = None;
-        for (k, &byte) in bytes.iter().enumerate().skip(open + 1) {
-            match (quote, byte) {
-                (None, b'>') => {
-                    end = Some(k + 1);
-                    break;
-                }
-                (None, b'"' | b'\'') => quote = Some(byte),
-                // What follows is another tag, and this one is broken.
-                (None, b'<') => return None,
-                (Some(q), _) if q == byte => quote = None,
-                _ => {}
-            }
-        }
-        let end = end?;
-        self.depth += usize::from(bytes[end - 2] != b'/');
-        Some(end)
-    }
-
-    /// What `tag` has too much of, after it was opened.
-    fn excess(&mut self, tag: &[u8]) -> Option<String> {
-        let (mut quote, mut n_attributes) = (None, 0);
-        for (k, &byte) in tag.iter().enumerate() {
-            match (quote, byte) {
-                (None, b'"' | b'\'') => quote = Some(byte),
-                (None, b'=') => n_attributes += 1,
-                (None, b'x') if tag[k..].starts_with(b"xmlns") && tag[k - 1].is_ascii_whitespace() => {
-                    self.n_namespaces += 1;
-                }
-                (Some(q), _) if q == byte => quote = None,
-                _ => {}
-            }
-        }
-        let counts = [
-            (self.depth, MAX_DEPTH, "elements inside each other"),
-            (n_attributes, MAX_ATTRIBUTES, "attributes in one element"),
-            (self.n_namespaces, MAX_NAMESPACES, "declarations of name spaces"),
-        ];
-        let (_, limit, what) = counts.into_iter().find(|(count, limit, _)| count > limit)?;
-        Some(format!("has more than {limit} {what}"))
-    }
 }
 
 fn dtd(place: Place) -> Diagnostic {

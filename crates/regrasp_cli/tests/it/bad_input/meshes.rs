@@ -92,7 +92,7 @@ fn mesh_that_is_a_folder_or_a_pipe() {
 
 #[test]
 fn mesh_of_a_format_that_is_not_read() {
-    mesh_is_refused("mug.dae", "<COLLADA/>", "M200", "mug.dae", &[".dae", ".stl or .obj", "trimesh"]);
+    mesh_is_refused("mug.3ds", "<COLLADA/>", "M200", "mug.3ds", &[".3ds", ".dae or .glb", "trimesh"]);
     mesh_is_refused("mug", TETRAHEDRON, "M200", "mug", &["no extension"]);
 }
 
