@@ -76,7 +76,13 @@ impl Room {
             let _ = writeln!(out, "  balls: {refusal}");
             return;
         }
-        let _ = writeln!(out, "  balls that can be held:         {}", range(&self.balls, |ball| ball.center.is_some()));
+        // Few poses of a ball are looked at; hands of short fingers hold it at few.
+        let more = match (&self.only_hold, &self.never_lets_go) {
+            (None, None) => "",
+            _ => " (at a few poses each; `regrasp place --hold` looks at more)",
+        };
+        let held = range(&self.balls, |ball| ball.center.is_some());
+        let _ = writeln!(out, "  balls that can be held:         {held}{more}");
         let _ = writeln!(out, "  balls that every finger can let go of: {}", range(&self.balls, |ball| ball.lets_go));
         let best = self.balls.iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence));
         if let Some((ball, center)) = best.and_then(|ball| Some((ball, ball.center?))) {
