@@ -55,7 +55,8 @@ name = "box"
 box = { size = [0.02, 0.02, 0.02] }
 position = [0.2, 0.0, 0.1]
 """
-MESH = SPHERE.replace("sphere = { radius = 0.032 }", 'mesh = { file = "mesh.SUFFIX", origin = "center" }')
+SUFFIXES = ("obj", "stl", "ply", "dae", "glb")
+MESH = SPHERE.replace("sphere = { radius = 0.032 }", 'mesh = { file = "mesh.SUFFIX", origin = "center", scale = "fit:0.056" }')
 CUBE = [(x, y, z) for x in (-0.028, 0.028) for y in (-0.028, 0.028) for z in (-0.028, 0.028)]
 FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
 
@@ -86,12 +87,15 @@ def good_files(program, folder, environment):
     for name in ("hand.urdf", "hand.toml"):
         shutil.copy(hand / name, folder / name)
     (folder / "scene.toml").write_text(SPHERE)
-    for suffix in ("obj", "stl"):
+    for suffix in SUFFIXES:
         (folder / f"{suffix}.toml").write_text(MESH.replace("SUFFIX", suffix))
     vertices = "".join(f"v {x} {y} {z}\n" for x, y, z in CUBE)
     (folder / "mesh.obj").write_text(vertices + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in FACES))
     facets = b"".join(mutate.struct.pack("<12fH", 0, 0, 0, *(x for v in face for x in CUBE[v]), 0) for face in FACES)
     (folder / "mesh.stl").write_bytes(bytes(80) + mutate.struct.pack("<I", len(FACES)) + facets)
+    seeds = {"ply": "ply/little.ply", "dae": "dae/triangles.dae", "glb": "glb/two.glb"}
+    for suffix, seed in seeds.items():
+        shutil.copy(REPOSITORY / "fuzz/seeds" / seed, folder / f"mesh.{suffix}")
     for name in ("football.toml", "cubic.toml"):
         text = (REPOSITORY / "scenes" / name).read_text()
         (folder / name).write_text(text.replace('file = "../', f'file = "{REPOSITORY}/'))
@@ -143,8 +147,7 @@ def commands(rng, target):
     by_target = {
         "hand.urdf": [["inspect", "hand.urdf", "--samples", "50", "-o", "made.toml"], ["inspect", "hand.toml", "--samples", "20"], *of_scene],
         "hand.toml": [["inspect", "hand.toml", "--samples", "50", "-o", "made.toml"], *of_scene],
-        "mesh.obj": [plan_of("obj.toml")],
-        "mesh.stl": [plan_of("stl.toml")],
+        **{f"mesh.{suffix}": [plan_of(f"{suffix}.toml")] for suffix in SUFFIXES},
         "obj.toml": [plan_of("obj.toml")],
         "settings.json": [plan_of("scene.toml", "--settings", "settings.json")],
         "graph.roadmap": [
@@ -163,6 +166,7 @@ def commands(rng, target):
 # Plans and scenes have most kinds of places.
 TARGETS = {
     "hand.urdf": 20, "hand.toml": 12, "scene.toml": 18, "obj.toml": 4, "cubic.toml": 3, "football.toml": 5, "mesh.obj": 8, "mesh.stl": 6,
+    "mesh.ply": 5, "mesh.dae": 5, "mesh.glb": 5,
     "plan.json": 10, "relocated.json": 10, "tracked.json": 6, "settings.json": 5, "graph.roadmap": 14,
 }
 ACCEPTED = re.compile(r"^check  ACCEPTED", re.MULTILINE)

@@ -316,6 +316,51 @@ def stl_mutant(rng, data):
     return bytes(data)
 
 
+def poked(rng, data):
+    """Some words of binary numbers overwritten, or a piece of them cut out."""
+    data = bytearray(data)
+    for _ in range(rng.choice([0, 1, 2, 10])):
+        if len(data) < 8:
+            break
+        at = rng.randrange(len(data) - 4)
+        value = rng.choice([0, 1, 3, 255, 2**31, 2**32 - 1, 0x7F800000, 0x7FC00000, 0x3F800000, rng.randrange(2**32)])
+        data[at : at + 4] = struct.pack("<I", value)
+    return cut(rng, bytes(data)) if rng.random() < 0.2 else bytes(data)
+
+
+def ply_mutant(rng, data):
+    """A mutant of a binary PLY file: of its header, its numbers, or both."""
+    head, end, body = data.partition(b"end_header\n")
+    if rng.random() < 0.7:
+        text = head.decode("ascii")
+        draw = rng.random()
+        if draw < 0.4:
+            text = replace_match(rng, text, NUMBER, lambda old: number(rng, old))
+        elif draw < 0.6:
+            names = ["char", "uchar", "int", "double", "float", "list uchar int", "ascii", "binary_big_endian", "x", "face"]
+            text = replace_match(rng, text, re.compile(r"[a-z_]+"), lambda _: rng.choice(names))
+        else:
+            text = line_mutant(rng, text, json.dumps)
+        head = text.encode("utf-8", "replace")
+    return (head + end + poked(rng, body))[:MOST_BYTES]
+
+
+def glb_mutant(rng, data):
+    """A mutant of a binary glTF file, mostly with the lengths of its chunks made good."""
+    length = struct.unpack("<I", data[12:16])[0]
+    text, numbers = data[20 : 20 + length].decode("utf-8"), data[28 + length :]
+    for _ in range(rng.choice([1, 1, 2, 4])):
+        try:
+            text = json_mutant(rng, text)[:MOST_BYTES]
+        except (ValueError, RecursionError):
+            break
+    chunk = text.encode("utf-8", "replace")
+    numbers = poked(rng, numbers)
+    made = b"glTF" + struct.pack("<II", 2, 28 + len(chunk) + len(numbers))
+    made += struct.pack("<I", len(chunk)) + b"JSON" + chunk + struct.pack("<I", len(numbers)) + b"BIN\0" + numbers
+    return poked(rng, made) if rng.random() < 0.1 else made
+
+
 def checksum(data):
     """That of docs/reference/roadmap-format.md: four lanes of words, mixed."""
     mask = (1 << 64) - 1
@@ -402,5 +447,8 @@ BY_SUFFIX = {
     ".json": text_mutant(json_mutant),
     ".obj": text_mutant(obj_mutant),
     ".stl": stl_mutant,
+    ".ply": ply_mutant,
+    ".dae": text_mutant(xml_mutant),
+    ".glb": glb_mutant,
     ".roadmap": roadmap_mutant,
 }
