@@ -122,6 +122,19 @@ fn meshes_that_are_drawn_are_read_files_and_may_be_missing() {
     assert_eq!(read.inputs.iter().map(|input| input.role.as_str()).collect::<Vec<_>>(), ["hand", "urdf", "mesh"]);
 }
 
+/// A sheet has no inside: said once for each link, by its name.
+#[test]
+fn a_tip_that_is_a_sheet_is_refused_once() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("tip.obj"), "v 0 0 0\nv 0.01 0 0\nv 0 0.01 0.02\nf 1 2 3\n").unwrap();
+    let mesh = r#"<collision><geometry><mesh filename="tip.obj"/></geometry></collision>"#;
+    let error =
+        load_hand(&write_urdf(folder.path(), &fingers("palm", ROD, mesh)), &LoadOptions::default()).unwrap_err();
+    let said: Vec<(&str, &str)> = error.diagnostics.iter().map(|d| (d.code, d.element.as_str())).collect();
+    let expected = [r#"link "i_c""#, r#"link "m_c""#, r#"link "t_c""#].map(|link| ("U210", link));
+    assert_eq!(said, expected, "{error}");
+}
+
 #[test]
 fn a_hand_file_names_only_links_whose_visuals_are_all_they_have() {
     let folder = tempfile::tempdir().unwrap();

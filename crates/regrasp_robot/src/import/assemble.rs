@@ -352,6 +352,10 @@ fn make_finger(
             }
             let own: Vec<&PlacedShape> =
                 shapes.iter().filter(|shape| shape.is_tip).map(|shape| &shape.placed).collect();
+            // Geometry without a hull has been refused above.
+            if own.is_empty() && n_elements > 0 {
+                return None;
+            }
             match hull_tips.make(&own, &(body_from_link * center), pad.as_ref(), elements) {
                 Ok((center, shape)) => tip(shape, center),
                 Err((problem, expected, fix)) => {
