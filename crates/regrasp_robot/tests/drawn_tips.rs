@@ -112,6 +112,12 @@ fn meshes_that_are_drawn_are_read_files_and_may_be_missing() {
     assert!(notes.len() == 1 && notes[0].contains("cannot be read") && notes[0].contains("tip.obj"), "{notes:?}");
     assert!(lost.hand.fingers.iter().all(|finger| matches!(finger.tip.shape, TipShape::Point)));
 
+    // The same where what cannot be read is left out.
+    let lenient = LoadOptions { lenient: true, ..LoadOptions::default() };
+    let lost = load_hand(&folder.path().join("hand.urdf"), &lenient).unwrap();
+    assert!(said(&lost)[0].contains("cannot be read"), "{:?}", lost.notes);
+    assert!(!hand_file_text(&lost.hand, "hand.urdf", &BTreeSet::new()).contains("collision_from_visuals"));
+
     let corners = ["v -8 -8 0", "v 8 -8 0", "v 8 8 0", "v -8 8 0", "v 0 0 30"];
     let faces = ["f 1 3 2", "f 1 4 3", "f 1 2 5", "f 2 3 5", "f 3 4 5", "f 4 1 5"];
     fs::write(folder.path().join("tip.obj"), corners.join("\n") + "\n" + &faces.join("\n")).unwrap();

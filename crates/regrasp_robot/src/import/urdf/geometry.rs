@@ -11,6 +11,8 @@ use roxmltree::Node;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+/// How remarks begin about geometry that was left out.
+pub(crate) const DROPPED: &str = "collision geometry dropped";
 /// Tags of geometry that are read.
 pub(super) const SHAPES: [&str; 5] = ["box", "cylinder", "sphere", "capsule", "mesh"];
 /// Greater lengths are nonsense in any unit, in metres; they would turn sums into infinity.
@@ -193,7 +195,7 @@ fn read_mesh(reader: &mut Reader, node: Node, element: Named, meshes: &mut Meshe
 fn drop_or_refuse(reader: &mut Reader, node: Node, element: Named, error: InputError) {
     if reader.lenient {
         let causes: Vec<&str> = error.diagnostics.iter().map(|d| d.problem.as_str()).collect();
-        reader.note(node, element, format!("collision geometry dropped: {}", causes.join("; ")));
+        reader.note(node, element, format!("{DROPPED}: {}", causes.join("; ")));
         return;
     }
     for diagnostic in error.diagnostics {

@@ -11,6 +11,7 @@ mod mimic;
 mod tree;
 mod visual;
 
+pub(crate) use geometry::DROPPED;
 pub(crate) use mimic::{GOOD_COUPLING, check_coupling, refuse_empty_range};
 
 use super::options::{LoadOptions, LoadedInput};
