@@ -4,7 +4,7 @@
 //! planning and are passed over.
 
 use super::placed::{Corners, Placed};
-use super::polygon::{MAX_CONCAVE, triangulate};
+use super::polygon::{Cutter, MAX_CONCAVE};
 use super::{MAX_TRIANGLES, check_encoding, not_a_number, shown, too_many};
 use crate::frame::{Point, Vector};
 use crate::mesh::TriangleMesh;
@@ -17,12 +17,16 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Most nodes of the scene, each as often as it is there: nodes may stand for others, and those for others again.
+/// Most nodes of the scene and what they hold, each as often as it is there: nodes may stand for others, and those for others again.
 const MAX_PLACED: usize = 100_000;
 /// Most nodes that stand for each other in a row.
 const MAX_DEPTH: usize = 64;
 /// Elements of a mesh that have a surface.
 const SURFACES: [&str; 5] = ["triangles", "trifans", "tristrips", "polylist", "polygons"];
+/// Elements of a node that are placed by it.
+const HELD: [&str; 4] = ["node", "instance_node", "instance_geometry", "instance_controller"];
+/// Geometry that is not read here.
+const OTHER_GEOMETRY: [&str; 3] = ["convex_mesh", "spline", "brep"];
 
 /// Reads a COLLADA file: the geometry of its scene, or all geometry where it has no scene. Polygons, concave ones too, are cut into
 /// triangles.
@@ -53,13 +57,19 @@ pub fn read_dae(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
         let problem = format!("the outermost element is <{}>", root.tag_name().name());
         return Err(file.fault(root, problem).expected("<COLLADA>").into());
     }
-    let mut scene =
-        Scene { placed: Placed::new(path), n_placed: 0, geometries: BTreeMap::new(), positions: BTreeMap::new() };
+    let mut scene = Scene {
+        placed: Placed::new(path),
+        cutter: Cutter::default(),
+        n_placed: 0,
+        nodes: BTreeMap::new(),
+        geometries: BTreeMap::new(),
+        positions: BTreeMap::new(),
+    };
     let unit = Matrix4::new_scaling(file.metres(root)?);
     match file.visual_scene(root)? {
         Some(nodes) => {
             for node in children(nodes, "node") {
-                file.read_node(node, &unit, 0, &mut scene)?;
+                file.read_node(node, &Ok(unit), 0, &mut scene)?;
             }
         }
         None => {
@@ -71,13 +81,25 @@ pub fn read_dae(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
     scene.placed.finish()
 }
 
-/// Elements by their ids.
-fn ids<'a, 'i>(root: Node<'a, 'i>) -> BTreeMap<&'a str, Node<'a, 'i>> {
-    root.descendants().filter_map(|node| Some((node.attribute("id")?, node))).collect()
+fn ids<'a, 'i>(root: Node<'a, 'i>) -> Ids<'a, 'i> {
+    let named = root.descendants().filter_map(|node| Some(((node.tag_name().name(), node.attribute("id")?), node)));
+    let mut ids = BTreeMap::new();
+    for (name, node) in named {
+        ids.entry(name).or_insert(node);
+    }
+    ids
 }
+
+/// Elements by their tags and ids: files of some exporters have one id for elements of several kinds.
+type Ids<'a, 'i> = BTreeMap<(&'a str, &'a str), Node<'a, 'i>>;
 
 fn children<'a, 'i: 'a>(node: Node<'a, 'i>, name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
     node.children().filter(move |child| child.has_tag_name_of(name))
+}
+
+/// How many faces `primitive` says it has; 0 where it says nothing.
+fn count_of(primitive: Node) -> usize {
+    primitive.attribute("count").and_then(|text| text.trim().parse().ok()).unwrap_or(0)
 }
 
 /// Tags compared by their local name: files declare one of two name spaces, or none.
@@ -91,11 +113,21 @@ impl LocalName for Node<'_, '_> {
     }
 }
 
+/// A node by itself.
+struct OwnNode<'a, 'i> {
+    above_from_node: Result<Matrix4<f64>, InputError>,
+    /// Nodes and instances in it.
+    holds: Vec<Node<'a, 'i>>,
+}
+
 /// What is read so far.
-struct Scene<'a> {
+struct Scene<'a, 'i> {
     placed: Placed<'a>,
+    cutter: Cutter,
     n_placed: usize,
-    /// Each geometry and each array of positions is read once, however often it is placed; by the byte at which it begins.
+    /// Each node is read once, however often it is there; by the byte at which it begins.
+    nodes: BTreeMap<usize, Arc<OwnNode<'a, 'i>>>,
+    /// So are geometries and the vertices of meshes.
     geometries: BTreeMap<usize, Arc<Vec<Corners>>>,
     positions: BTreeMap<usize, Arc<Vec<Point>>>,
 }
@@ -104,7 +136,7 @@ struct Scene<'a> {
 struct File<'a, 'i> {
     path: &'a Path,
     lines: Lines,
-    ids: BTreeMap<&'a str, Node<'a, 'i>>,
+    ids: Ids<'a, 'i>,
 }
 
 /// Where the inputs of a primitive stand among its indices.
@@ -120,12 +152,12 @@ impl<'a, 'i> File<'a, 'i> {
         Diagnostic::new("M260", self.lines.place(self.path, node.range().start), problem)
     }
 
-    /// The element that attribute `name` of `node` points to.
-    fn target(&self, node: Node, name: &str) -> Result<Node<'a, 'i>, InputError> {
-        let url = node.attribute(name).unwrap_or_default();
-        url.strip_prefix('#').and_then(|id| self.ids.get(id)).copied().ok_or_else(|| {
-            let problem =
-                format!("<{}> points to \"{}\", which is not there", node.tag_name().name(), shown(url.as_bytes()));
+    /// The element called `tag` that attribute `name` of `node` points to.
+    fn target(&self, node: Node<'a, '_>, name: &str, tag: &'a str) -> Result<Node<'a, 'i>, InputError> {
+        let url: &'a str = node.attribute(name).unwrap_or_default();
+        url.strip_prefix('#').and_then(|id| self.ids.get(&(tag, id))).copied().ok_or_else(|| {
+            let seen = shown(url.as_bytes());
+            let problem = format!("<{}> points to <{tag}> \"{seen}\", which is not there", node.tag_name().name());
             self.fault(node, problem).expected("\"#ID\" of an element of this file").into()
         })
     }
@@ -147,7 +179,7 @@ impl<'a, 'i> File<'a, 'i> {
     fn visual_scene(&self, root: Node<'a, 'i>) -> Result<Option<Node<'a, 'i>>, InputError> {
         let shown = children(root, "scene").flat_map(|scene| children(scene, "instance_visual_scene")).next();
         match shown {
-            Some(instance) => self.target(instance, "url").map(Some),
+            Some(instance) => self.target(instance, "url", "visual_scene").map(Some),
             None => Ok(root.descendants().find(|node| node.has_tag_name_of("visual_scene"))),
         }
     }
@@ -155,38 +187,56 @@ impl<'a, 'i> File<'a, 'i> {
     fn read_node(
         &self,
         node: Node<'a, 'i>,
-        above: &Matrix4<f64>,
+        above: &Result<Matrix4<f64>, InputError>,
         depth: usize,
-        scene: &mut Scene,
+        scene: &mut Scene<'a, 'i>,
     ) -> Result<(), InputError> {
-        scene.n_placed += 1;
+        let start = node.range().start;
+        let own = match scene.nodes.get(&start) {
+            Some(known) => known.clone(),
+            None => {
+                let own = Arc::new(self.own(node));
+                scene.nodes.insert(start, own.clone());
+                own
+            }
+        };
+        scene.n_placed += 1 + own.holds.len();
         if scene.n_placed > MAX_PLACED || depth > MAX_DEPTH {
             let problem = format!("places more than {MAX_PLACED} nodes, or more than {MAX_DEPTH} inside each other");
             return Err(self.fault(node, problem).expected("nodes that do not stand for themselves").into());
         }
-        let mut world_from_node = *above;
-        for child in node.children().filter(Node::is_element) {
-            if let Some(matrix) = self.transform(child)? {
-                world_from_node *= matrix;
-            }
-        }
-        for child in node.children().filter(Node::is_element) {
+        // What is wrong with a matrix matters where something is placed by it: not above a camera.
+        let file_from_node = match (above, &own.above_from_node) {
+            (Ok(above), Ok(own)) => Ok(above * own),
+            (Err(error), _) | (_, Err(error)) => Err(error.clone()),
+        };
+        for &child in &own.holds {
             match child.tag_name().name() {
-                "node" => self.read_node(child, &world_from_node, depth + 1, scene)?,
+                "node" => self.read_node(child, &file_from_node, depth + 1, scene)?,
                 "instance_node" => {
-                    self.read_node(self.target(child, "url")?, &world_from_node, depth + 1, scene)?;
+                    self.read_node(self.target(child, "url", "node")?, &file_from_node, depth + 1, scene)?;
                 }
                 "instance_geometry" => {
-                    self.read_geometry(self.target(child, "url")?, &world_from_node, scene)?;
+                    let geometry = self.target(child, "url", "geometry")?;
+                    self.read_geometry(geometry, file_from_node.as_ref().map_err(Clone::clone)?, scene)?;
                 }
-                "instance_controller" => {
+                _ => {
                     let error = self.fault(child, "has a skin (<instance_controller>), which is not read here");
                     return Err(error.expected("<instance_geometry>").fix("export the mesh without a skeleton").into());
                 }
-                _ => {}
             }
         }
         Ok(())
+    }
+
+    /// What `node` says itself.
+    fn own(&self, node: Node<'a, 'i>) -> OwnNode<'a, 'i> {
+        let elements = || node.children().filter(Node::is_element);
+        let above_from_node = elements().try_fold(Matrix4::identity(), |product, element| {
+            Ok(self.transform(element)?.map_or(product, |matrix| product * matrix))
+        });
+        let is_held = |child: &Node| HELD.iter().any(|name| child.has_tag_name_of(name));
+        OwnNode { above_from_node, holds: elements().filter(is_held).collect() }
     }
 
     /// The transformation that `element` is, if it is one.
@@ -239,7 +289,7 @@ impl<'a, 'i> File<'a, 'i> {
         &self,
         geometry: Node<'a, 'i>,
         file_from_geometry: &Matrix4<f64>,
-        scene: &mut Scene,
+        scene: &mut Scene<'a, 'i>,
     ) -> Result<(), InputError> {
         let triangles = match scene.geometries.get(&geometry.range().start) {
             Some(known) => known.clone(),
@@ -253,16 +303,26 @@ impl<'a, 'i> File<'a, 'i> {
     }
 
     /// The triangles of `geometry`, in its frame.
-    fn triangles_of(&self, geometry: Node<'a, 'i>, scene: &mut Scene) -> Result<Vec<Corners>, InputError> {
+    fn triangles_of(&self, geometry: Node<'a, 'i>, scene: &mut Scene<'a, 'i>) -> Result<Vec<Corners>, InputError> {
         let mut triangles = Vec::new();
+        if let Some(other) =
+            geometry.children().find(|node| OTHER_GEOMETRY.iter().any(|name| node.has_tag_name_of(name)))
+        {
+            let error = self.fault(other, format!("has a <{}>, which is not read here", other.tag_name().name()));
+            return Err(error.expected("<mesh>").fix("export the mesh in triangles").into());
+        }
         let primitives = children(geometry, "mesh").flat_map(|mesh| mesh.children());
         // Lines and points have no surface.
         let is_surface = |node: &Node| SURFACES.iter().any(|name| node.has_tag_name_of(name));
         for primitive in primitives.filter(is_surface) {
+            // A material without faces.
+            if children(primitive, "p").chain(children(primitive, "ph")).next().is_none() && count_of(primitive) == 0 {
+                continue;
+            }
             let inputs = self.inputs(primitive, scene)?;
             let mut indices = Vec::new();
             for face in self.corners(primitive, &inputs)? {
-                if !triangulate(&face, &inputs.positions, &mut indices) {
+                if !scene.cutter.triangulate(&face, &inputs.positions, &mut indices) {
                     let problem = format!("a concave polygon has {} corners", face.len());
                     let expected = format!("at most {MAX_CONCAVE} where it is not convex");
                     return Err(self.fault(primitive, problem).expected(expected).into());
@@ -277,7 +337,7 @@ impl<'a, 'i> File<'a, 'i> {
     }
 
     /// The inputs of `primitive`. Errors: no positions.
-    fn inputs(&self, primitive: Node<'a, 'i>, scene: &mut Scene) -> Result<Inputs, InputError> {
+    fn inputs(&self, primitive: Node<'a, 'i>, scene: &mut Scene<'a, 'i>) -> Result<Inputs, InputError> {
         let (mut vertices, mut stride) = (None, 1);
         for input in children(primitive, "input") {
             let offset = input.attribute("offset").map_or(Some(0), |text| text.trim().parse::<usize>().ok());
@@ -289,23 +349,24 @@ impl<'a, 'i> File<'a, 'i> {
             };
             stride = stride.max(offset + 1);
             if input.attribute("semantic") == Some("VERTEX") {
-                vertices = Some((offset, self.target(input, "source")?));
+                vertices = Some((offset, self.target(input, "source", "vertices")?));
             }
         }
         let Some((offset, vertices)) = vertices else {
             let name = primitive.tag_name().name();
             return Err(self.fault(primitive, format!("<{name}> has no input VERTEX")).expected("one").into());
         };
-        let position = children(vertices, "input").find(|input| input.attribute("semantic") == Some("POSITION"));
-        let Some(position) = position else {
-            return Err(self.fault(vertices, "has no input POSITION").expected("one").into());
-        };
-        let source = self.target(position, "source")?;
-        let positions = match scene.positions.get(&source.range().start) {
+        let start = vertices.range().start;
+        let positions = match scene.positions.get(&start) {
             Some(known) => known.clone(),
             None => {
-                let positions = Arc::new(self.positions(source)?);
-                scene.positions.insert(source.range().start, positions.clone());
+                let inputs = children(vertices, "input");
+                let Some(position) = inputs.into_iter().find(|input| input.attribute("semantic") == Some("POSITION"))
+                else {
+                    return Err(self.fault(vertices, "has no input POSITION").expected("one").into());
+                };
+                let positions = Arc::new(self.positions(self.target(position, "source", "source")?)?);
+                scene.positions.insert(start, positions.clone());
                 positions
             }
         };
@@ -347,6 +408,10 @@ impl<'a, 'i> File<'a, 'i> {
         let mut lists = Vec::new();
         for list in children(primitive, "p") {
             let numbers = self.numbers(list)?;
+            if numbers.len() % inputs.stride != 0 {
+                let problem = format!("<p> has {} numbers", numbers.len());
+                return Err(self.fault(list, problem).expected(format!("{} for each corner", inputs.stride)).into());
+            }
             let mut corners = Vec::with_capacity(numbers.len() / inputs.stride);
             for corner in numbers.chunks_exact(inputs.stride) {
                 let index = corner[inputs.offset];
@@ -396,6 +461,12 @@ impl<'a, 'i> File<'a, 'i> {
                     rest = after;
                 }
             }
+        }
+        let stated = if matches!(name, "triangles" | "polylist" | "polygons") { count_of(primitive) } else { 0 };
+        if faces.len() < stated {
+            let problem = format!("<{name}> has {} faces", faces.len());
+            let error = self.fault(primitive, problem).expected(format!("{stated}, as its count says"));
+            return Err(error.fix("the file is cut short: export it again").into());
         }
         match faces.iter().find(|face| face.len() < 3) {
             Some(face) => Err(few(face.len())),

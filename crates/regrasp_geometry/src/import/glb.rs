@@ -50,11 +50,17 @@ struct NodeEntry {
     /// A unit quaternion, x y z w.
     rotation: Option<[f64; 4]>,
     scale: Option<[f64; 3]>,
+    skin: Option<usize>,
+    #[serde(default)]
+    extensions: BTreeMap<String, serde::de::IgnoredAny>,
 }
 
 #[derive(Deserialize)]
 struct MeshEntry {
     primitives: Vec<Primitive>,
+    /// Of shapes that the mesh is drawn towards.
+    #[serde(default)]
+    weights: Vec<f64>,
 }
 
 #[derive(Deserialize)]
@@ -107,12 +113,16 @@ pub fn read_glb(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
     })?;
     let gltf: Gltf =
         serde_json::from_slice(json).map_err(|error| fault(format!("its JSON cannot be read: {error}")))?;
-    if let Some(name) = gltf.extensions_required.iter().find(|name| !PASSED_OVER.contains(&name.as_str())) {
+    if let Some(name) = gltf.extensions_required.iter().find(|name| !is_passed_over(name)) {
         let error = fault(format!("needs the extension {}, which is not read here", shown(name.as_bytes())));
-        return Err(error.expected("no compression").fix("export it without compression").into());
+        return Err(error
+            .expected("plain numbers")
+            .fix("export it without compression and without this extension")
+            .into());
     }
     let file = File { path, gltf: &gltf, binary };
-    let mut placing = Placing { placed: Placed::new(path), n_placed: 0, meshes: BTreeMap::new() };
+    let mut placing =
+        Placing { placed: Placed::new(path), n_placed: 0, meshes: BTreeMap::new(), positions: BTreeMap::new() };
     let scene = gltf
         .scene
         .map_or_else(|| Ok(gltf.scenes.first()), |index| file.entry(&gltf.scenes, index, "scene").map(Some))?;
@@ -124,7 +134,7 @@ pub fn read_glb(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
         }
         None => {
             for mesh in 0..gltf.meshes.len() {
-                let triangles = file.mesh(mesh)?;
+                let triangles = file.mesh(mesh, &mut placing.positions)?;
                 placing.placed.add(&triangles, &Matrix4::identity())?;
             }
         }
@@ -132,9 +142,15 @@ pub fn read_glb(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
     placing.placed.finish()
 }
 
-/// Extensions that change nothing of the surface.
-const PASSED_OVER: [&str; 4] =
-    ["KHR_materials_unlit", "KHR_texture_transform", "KHR_texture_basisu", "KHR_materials_pbrSpecularGlossiness"];
+/// True of extensions that change nothing of the surface.
+fn is_passed_over(name: &str) -> bool {
+    const PARTS: [&str; 7] =
+        ["_materials_", "_texture_", "_lights_", "_animation_", "_xmp", "_audio", "_node_visibility"];
+    PARTS.iter().any(|part| name.contains(part))
+}
+
+/// An extension that places a mesh many times.
+const INSTANCES: &str = "EXT_mesh_gpu_instancing";
 
 /// The chunks of JSON and of numbers.
 fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), &'static str> {
@@ -147,10 +163,14 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), &'static str> {
     }
     let chunk = |at: usize| -> Option<(u32, &[u8])> {
         let length = word(at)? as usize;
-        Some((word(at + 4)?, bytes.get(at + 8..at + 8 + length)?))
+        // Some writers leave out the bytes that fill the last word.
+        let (start, missing) = (at + 8, (at + 8 + length).saturating_sub(bytes.len()));
+        Some((word(at + 4)?, bytes.get(start..start + length - missing.min(3).min(length))?))
     };
     let Some((JSON, json)) = chunk(12) else { return Err("has no whole chunk of JSON: it is cut short, or no glTF") };
     let after = 20 + json.len();
+    let json = json.trim_ascii_end();
+    let json = &json[..json.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1)];
     match chunk(after) {
         Some((BINARY, binary)) => Ok((json, binary)),
         None if word(after + 4) == Some(BINARY) => Err("is cut short: its chunk of numbers ends too early"),
@@ -163,6 +183,8 @@ struct Placing<'a> {
     n_placed: usize,
     /// Each mesh is read once, however often it is placed.
     meshes: BTreeMap<usize, Arc<Vec<Corners>>>,
+    /// So are positions, however many parts of meshes share them.
+    positions: BTreeMap<usize, Arc<Vec<Point>>>,
 }
 
 /// A file under reading.
@@ -193,10 +215,15 @@ impl<'a> File<'a> {
         let entry = self.entry(&self.gltf.nodes, node, "node")?;
         let file_from_node = above * self.transform(entry, node)?;
         if let Some(mesh) = entry.mesh {
+            let other = if entry.skin.is_some() { Some("a skin") } else { None };
+            if let Some(other) = other.or(entry.extensions.contains_key(INSTANCES).then_some(INSTANCES)) {
+                let error = self.fault(format!("node {node} places its mesh by {other}, which is not read here"));
+                return Err(error.expected("a mesh placed by its node").fix("export the mesh alone").into());
+            }
             let triangles = match placing.meshes.get(&mesh) {
                 Some(known) => known.clone(),
                 None => {
-                    let triangles = Arc::new(self.mesh(mesh)?);
+                    let triangles = Arc::new(self.mesh(mesh, &mut placing.positions)?);
                     placing.meshes.insert(mesh, triangles.clone());
                     triangles
                 }
@@ -222,21 +249,34 @@ impl<'a> File<'a> {
     }
 
     /// The triangles of a mesh, in its frame.
-    fn mesh(&self, mesh: usize) -> Result<Vec<Corners>, InputError> {
+    fn mesh(&self, mesh: usize, known: &mut BTreeMap<usize, Arc<Vec<Point>>>) -> Result<Vec<Corners>, InputError> {
         let mut triangles: Vec<Corners> = Vec::new();
-        for primitive in &self.entry(&self.gltf.meshes, mesh, "mesh")?.primitives {
+        let entry = self.entry(&self.gltf.meshes, mesh, "mesh")?;
+        if entry.weights.iter().any(|weight| *weight != 0.0) {
+            let error =
+                self.fault(format!("mesh {mesh} is drawn towards other shapes (weights), which are not read here"));
+            return Err(error.expected("weights of 0, or none").fix("export the mesh as it looks").into());
+        }
+        for primitive in &entry.primitives {
             let mode = primitive.mode.unwrap_or(4);
             // Points and lines have no surface.
             if mode < 4 {
                 continue;
             }
-            let Some(&positions) = primitive.attributes.get("POSITION") else {
-                return Err(self.fault(format!("a part of mesh {mesh} has no POSITION")).expected("positions").into());
+            // What has no positions is not drawn (glTF 2.0, section 3.7.2.1).
+            let Some(&positions) = primitive.attributes.get("POSITION") else { continue };
+            let points = match known.get(&positions) {
+                Some(points) => points.clone(),
+                None => {
+                    let numbers = self.numbers(positions, "VEC3", 3)?;
+                    let points = numbers.chunks_exact(3).map(|c| Point::new(c[0], c[1], c[2]));
+                    let points = Arc::new(points.collect::<Vec<Point>>());
+                    known.insert(positions, points.clone());
+                    points
+                }
             };
-            let positions = self.numbers(positions, "VEC3", 3)?;
-            let points: Vec<Point> = positions.chunks_exact(3).map(|c| Point::new(c[0], c[1], c[2])).collect();
             let corners: Vec<Point> = match primitive.indices {
-                None => points,
+                None => points.to_vec(),
                 Some(indices) => {
                     let at = |index: f64| {
                         points.get(index as usize).copied().ok_or_else(|| {
@@ -298,7 +338,10 @@ impl<'a> File<'a> {
         if view.buffer != 0 || buffer.uri.is_some() {
             return Err(fault("is in another file".into(), "numbers in the file itself, as .glb has them"));
         }
-        let stride = view.byte_stride.unwrap_or(width * size);
+        let stride = view.byte_stride.filter(|stride| *stride > 0).unwrap_or(width * size);
+        if entry.count > 3 * MAX_TRIANGLES {
+            return Err(too_many(self.path, entry.count / 3));
+        }
         let bytes =
             view.byte_offset.checked_add(view.byte_length).and_then(|end| self.binary.get(view.byte_offset..end));
         let bytes = bytes.and_then(|bytes| bytes.get(entry.byte_offset..));

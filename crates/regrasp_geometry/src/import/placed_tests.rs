@@ -94,6 +94,18 @@ fn every_dialect_of_ply_gives_the_tetrahedron() {
     for is_big in [false, true] {
         is_the_tetrahedron("a.ply", &binary_ply(is_big), 1.0);
     }
+    is_the_tetrahedron("a.ply", format!("\u{feff}{text}").as_bytes(), 1.0);
+    is_the_tetrahedron("a.ply", text.replace("float x", "float X").as_bytes(), 1.0);
+    // What is not needed may be anything, and so may vertices that no face names.
+    is_the_tetrahedron("a.ply", text.replacen("255 1 0 0 1 -7", "-nan(ind) 1 0 0 1 ?", 1).as_bytes(), 1.0);
+    let more = text.replace("vertex 4", "vertex 5").replacen("\n0 1 \n", "\n255 nan inf 0 0 \n0 1 \n", 1);
+    is_the_tetrahedron("a.ply", more.as_bytes(), 1.0);
+    // Carriage returns alone, and a body that begins with the byte of a line feed.
+    let mut returns = binary_ply(false);
+    let body = returns.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    returns[..body].iter_mut().filter(|byte| **byte == b'\n').for_each(|byte| *byte = b'\r');
+    returns[body] = b'\n';
+    is_the_tetrahedron("a.ply", &returns, 1.0);
     // Faces of four corners and more are cut.
     let pyramid = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\nelement face 5\n\
         property list uchar uint vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n.5 .5 1\n4 0 3 2 1\n3 0 1 4\n3 1 2 4\n3 2 3 4\n3 3 0 4\n";
@@ -121,13 +133,34 @@ fn faulty_ply_is_refused_with_its_place() {
     assert_eq!(with("end_header", "end"), [("M250", Some(17))]);
     assert_eq!(with("comment", "commend"), [("M250", Some(3))]);
     assert_eq!(with("255 1 0 0 1", "255 1 0,5 0 1"), [("M250", Some(19))]);
-    assert_eq!(with("255 1 0 0 1", "255 nan 0 0 1"), [("M203", Some(19))]);
+    assert_eq!(with("255 1 0 0 1", "255 nan 0 0 1"), [("M203", None)]);
     assert_eq!(with("3 0 2 1 ", "3 0 2 4 "), [("M241", Some(23))]);
     assert_eq!(with("3 0 2 1 ", "3 0 2 -1 "), [("M241", Some(23))]);
     assert_eq!(with("3 0 2 1 -1", "2 0 2 -1"), [("M250", Some(23))]);
     assert_eq!(faults(read("a.ply", &text.as_bytes()[..text.len() - 12])), [("M250", Some(26))]);
     let binary = binary_ply(false);
     assert_eq!(faults(read("a.ply", &binary[..binary.len() - 1])), [("M250", None)]);
+    assert_eq!(with("element face 4", "element tristrips 4"), [("M250", Some(14))]);
+    let (vertex, face) = (text.find("element vertex").unwrap(), text.find("element face").unwrap());
+    let end = text.find("end_header").unwrap();
+    let turned = [&text[..vertex], &text[face..end], &text[vertex..face], &text[end..]].concat();
+    assert_eq!(faults(read("a.ply", turned.as_bytes())), [("M250", Some(5))]);
+    // Polygons that cross themselves are cut for a while, and then refused.
+    let n = 2_000;
+    let star: String = (0..n)
+        .map(|k| {
+            (1.0 + 0.3 * (f64::from(k) * 12.9898).sin(), (std::f64::consts::TAU * f64::from(k * 999) / f64::from(n)))
+        })
+        .map(|(radius, angle)| format!("{} {} 0\n", radius * angle.cos(), radius * angle.sin()))
+        .collect();
+    let corners: String = (0..n).map(|k| format!(" {k}")).collect();
+    let face = format!("{n}{corners}\n").repeat(30);
+    let stars = format!(
+        "ply\nformat ascii 1.0\nelement vertex {n}\nproperty float x\nproperty float y\nproperty float z\nelement face 30\n\
+         property list ushort ushort vertex_indices\nend_header\n{star}{face}"
+    );
+    let found = faults(read("a.ply", stars.as_bytes()));
+    assert!(found.iter().all(|(code, _)| *code == "M250") && !found.is_empty(), "{found:?}");
     let no_faces =
         "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
     assert_eq!(faults(read("a.ply", no_faces.as_bytes())), [("M202", None)]);
@@ -191,6 +224,12 @@ fn every_dialect_of_collada_gives_the_tetrahedron() {
     ] {
         is_the_tetrahedron("a.dae", dae("", &faces, NODE).as_bytes(), 1.0);
     }
+    // Materials without faces, an element of another kind with the same id, a camera with a matrix that is not read.
+    let more = format!("<triangles count=\"0\"/>{}<polylist count=\"0\">{INPUT}</polylist>", triangles());
+    let nodes = format!(
+        "<node id=\"t\"><node id=\"s\"/><node><lookat>0</lookat><instance_camera url=\"#c\"/></node></node>{NODE}"
+    );
+    is_the_tetrahedron("a.dae", dae("", &more, &nodes).as_bytes(), 1.0);
     let plain = dae("", &triangles(), NODE);
     is_the_tetrahedron("a.DAE", format!("\u{feff}{plain}").as_bytes(), 1.0);
     is_the_tetrahedron(
@@ -265,8 +304,13 @@ fn faulty_collada_is_refused_with_its_place() {
     assert_eq!(with("<p>0 0 0 2", "<p>0 0 0 x"), [("M260", Some(7))]);
     assert_eq!(with("<triangles count=\"4\">", "<polylist>").len(), 1);
     let nodes = |nodes: &str| faults(read("a.dae", dae("", &triangles(), nodes).as_bytes()));
-    assert_eq!(nodes("<node><skew>1</skew></node>"), [("M260", Some(11))]);
-    assert_eq!(nodes("<node><matrix>1 0 0</matrix></node>"), [("M260", Some(11))]);
+    let inside = |transform: &str| nodes(&NODE.replace("<node>", &format!("<node>{transform}")));
+    assert_eq!(inside("<skew>1</skew>"), [("M260", Some(11))]);
+    assert_eq!(inside("<matrix>1 0 0</matrix>"), [("M260", Some(11))]);
+    assert_eq!(with("<triangles count=\"4\">", "<triangles count=\"5\">"), [("M260", Some(7))]);
+    assert_eq!(with("<p>0 0 0 2", "<p>0 0 0 0 2"), [("M260", Some(7))]);
+    assert_eq!(with("<geometry id=\"t\">", "<geometry id=\"t\"><convex_mesh/>"), [("M260", Some(4))]);
+    assert_eq!(with("<vertices id=\"v\">", "<source id=\"v\"/><vertices id=\"w\">"), [("M260", Some(7))]);
     assert_eq!(nodes("<node><instance_controller url=\"#c\"/></node>"), [("M260", Some(11))]);
     assert_eq!(nodes("<node/>"), [("M202", None)]);
     // A node that stands for itself, and nodes of which each stands for the next ten times.
@@ -274,6 +318,10 @@ fn faulty_collada_is_refused_with_its_place() {
     let ten = |k: usize| {
         format!(r##"<node id="n{k}">{}</node>"##, format!(r##"<instance_node url="#n{}"/>"##, k + 1).repeat(10))
     };
+    let wide = r##"<node id="n"><scale>1 1 1</scale><instance_geometry url="#e"/></node>"##.to_owned()
+        + &format!("<node>{}</node>", r##"<instance_node url="#n"/>"##.repeat(60_000));
+    let empty = "</mesh></geometry><geometry id=\"e\"><mesh>";
+    assert_eq!(faults(read("a.dae", dae("", &(triangles() + empty), &wide).as_bytes())), [("M260", Some(11))]);
     let bomb: String =
         (0..12).map(ten).collect::<String>() + r##"<node id="n12"><instance_geometry url="#t"/></node>"##;
     assert_eq!(nodes(&bomb), [("M260", Some(11))]);
@@ -335,6 +383,16 @@ fn every_dialect_of_binary_gltf_gives_the_tetrahedron() {
     let (json, numbers) = (text(&good), good[good.len() - 116..].to_vec());
     let json = &json[..json.rfind("}]}").unwrap() + 3];
     is_the_tetrahedron("a.glb", &packed(json, &numbers), 1.0);
+    for name in ["EXT_texture_webp", "KHR_materials_transmission", "KHR_lights_punctual"] {
+        let more = format!(r#""extensionsRequired": ["{name}"], "asset""#);
+        is_the_tetrahedron("a.glb", &packed(&json.replace(r#""asset""#, &more), &numbers), 1.0);
+    }
+    // Words that are filled with zeros, or not at all.
+    is_the_tetrahedron("a.glb", &packed(&format!("{json}\0\0"), &numbers), 1.0);
+    let mut short = packed(json, &numbers);
+    let length = short.len() - numbers.len() - 8;
+    short[length..length + 4].copy_from_slice(&(numbers.len() as u32 + 2).to_le_bytes());
+    is_the_tetrahedron("a.glb", &short, 1.0);
     // Without a scene all meshes are there; without indices positions follow each other.
     is_the_tetrahedron(
         "a.glb",
@@ -360,7 +418,10 @@ fn every_dialect_of_binary_gltf_gives_the_tetrahedron() {
     assert_eq!(with(r#""mesh": 0"#, r#""children": [0]"#), refused);
     assert_eq!(with(r#""mesh": 0"#, r#""mesh": 0, "rotation": [0, 0, 0, 0]"#), refused);
     assert_eq!(with(r#""count": 12"#, r#""count": 13"#), refused);
-    assert_eq!(with(r#""count": 12"#, r#""count": 18446744073709551615"#), refused);
+    assert_eq!(with(r#""count": 12"#, r#""count": 18446744073709551615"#), [("M220", None)]);
+    assert_eq!(with(r#""mesh": 0"#, r#""mesh": 0, "skin": 0"#), refused);
+    assert_eq!(with(r#""mesh": 0"#, r#""mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}"#), refused);
+    assert_eq!(with(r#""primitives""#, r#""weights": [0.5], "primitives""#), refused);
     assert_eq!(with(r#""byteStride": 16"#, r#""byteStride": 8"#), refused);
     assert_eq!(with(r#""byteOffset": 68"#, r#""byteOffset": 18446744073709551615"#), refused);
     assert_eq!(with(r#""type": "SCALAR""#, r#""type": "VEC2""#), refused);

@@ -1,6 +1,6 @@
 //! PLY (Stanford polygon format), text and binary. Vertices and faces are read; colours, normals and other elements are passed over.
 
-use super::polygon::{MAX_CONCAVE, triangulate};
+use super::polygon::{Cutter, MAX_CONCAVE};
 use super::{Faults, MAX_TRIANGLES, TextLines, check_encoding, not_a_number, number, shown, too_many, words};
 use crate::frame::Point;
 use crate::mesh::TriangleMesh;
@@ -63,7 +63,8 @@ struct Element {
 impl Element {
     /// Where the property of one of these names stands; `is_list` says whether it is a list.
     fn index(&self, names: &[&str], is_list: bool) -> Option<usize> {
-        let is_it = |p: &Property| names.contains(&p.name.as_str()) && p.count.is_some() == is_list;
+        let is_named = |p: &Property| names.iter().any(|name| p.name.eq_ignore_ascii_case(name));
+        let is_it = |p: &Property| is_named(p) && p.count.is_some() == is_list;
         self.properties.iter().position(is_it)
     }
 }
@@ -74,13 +75,20 @@ impl Element {
 /// cannot be read, or a body that does not fit it.
 pub fn read_ply(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
     check_encoding(path, bytes)?;
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let header = read_header(path, bytes)?;
     let mut body = Body { path, format: header.format, bytes, at: header.end, lines: None, words: Vec::new(), line: 0 };
     if header.format == Format::Text {
         body.lines = Some(TextLines { rest: bytes.get(header.end..), line: header.n_lines });
     }
     let mut faults = Faults::new(path);
-    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    let (mut vertices, mut triangles, mut cutter) = (Vec::new(), Vec::new(), Cutter::default());
+    if let Some(face) = header.elements.iter().position(|element| element.name == "face")
+        && header.elements.iter().position(|element| element.name == "vertex").is_none_or(|vertex| vertex > face)
+    {
+        let error = fault(Place::line(path, header.elements[face].line), "faces stand before the vertices");
+        return Err(error.expected("element vertex before element face").into());
+    }
     for element in &header.elements {
         // Every entry takes a byte at least, so that no count can ask for more work than the file is long.
         if element.count > bytes.len() || (element.properties.is_empty() && element.count > 0) {
@@ -89,19 +97,36 @@ pub fn read_ply(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
             return Err(fault(Place::line(path, element.line), problem).expected("a count that fits the file").into());
         }
         match element.name.as_str() {
-            "vertex" => read_vertices(element, &mut body, &mut vertices, &mut faults)?,
-            "face" => read_faces(element, &mut body, &vertices, &mut triangles, &mut faults)?,
+            "vertex" => read_vertices(element, &mut body, &mut vertices)?,
+            "face" => read_faces(element, &mut body, &vertices, &mut triangles, &mut cutter, &mut faults)?,
+            "tristrips" => {
+                let error = fault(Place::line(path, element.line), "has triangle strips, which are not read here");
+                return Err(error.expected("element face").fix("export it with faces").into());
+            }
             _ => {
-                let mut values = Vec::new();
                 for _ in 0..element.count {
-                    for property in &element.properties {
-                        body.values(property, &mut values)?;
-                    }
+                    element.properties.iter().try_for_each(|property| body.pass_over(property))?;
                 }
             }
         }
     }
-    faults.finish(vertices, triangles)
+    refuse_not_finite(&vertices, &triangles, path, &mut faults);
+    // Vertices that no face names may be anything: scans on a grid have some that are NaN.
+    let used = vertices.into_iter().map(|v: Point| if v.iter().all(|x| x.is_finite()) { v } else { Point::origin() });
+    faults.finish(used.collect(), triangles)
+}
+
+/// Corners of triangles that are NaN or infinite (`M203`), each once.
+fn refuse_not_finite(vertices: &[Point], triangles: &[[u32; 3]], path: &Path, faults: &mut Faults) {
+    let mut bad: Vec<u32> = triangles.as_flattened().to_vec();
+    bad.retain(|&corner| vertices[corner as usize].iter().any(|x| !x.is_finite()));
+    bad.sort_unstable();
+    bad.dedup();
+    for index in bad {
+        let [x, y, z]: [f64; 3] = vertices[index as usize].coords.into();
+        let problem = format!("vertex {index} has the coordinates {x}, {y}, {z}");
+        faults.push(Diagnostic::new("M203", Place::file(path), problem).expected("finite numbers"));
+    }
 }
 
 fn fault(place: Place, problem: impl Into<String>) -> Diagnostic {
@@ -138,7 +163,12 @@ fn read_header(path: &Path, bytes: &[u8]) -> Result<Header, InputError> {
                         "\"format ascii 1.0\" or a binary one",
                     ));
                 };
-                let end = bytes.len() - lines.rest.map_or(0, <[u8]>::len);
+                let mut end = bytes.len() - lines.rest.map_or(0, <[u8]>::len);
+                // Where carriage returns alone end lines, a line feed after the last one belongs to the body.
+                let is_returns = bytes.get(3) == Some(&b'\r') && bytes.get(4) != Some(&b'\n');
+                if is_returns && bytes[..end].ends_with(b"\r\n") {
+                    end -= 1;
+                }
                 return Ok(Header { format, elements, end, n_lines: lines.line });
             }
             [b"format", word, ..] => {
@@ -202,7 +232,7 @@ struct Body<'a> {
     line: u32,
 }
 
-impl Body<'_> {
+impl<'a> Body<'a> {
     fn place(&self) -> Place {
         if self.format == Format::Text { Place::line(self.path, self.line) } else { Place::file(self.path) }
     }
@@ -214,16 +244,21 @@ impl Body<'_> {
             .into()
     }
 
+    /// The next word of a text body.
+    fn word(&mut self) -> Result<&'a [u8], InputError> {
+        while self.words.is_empty() {
+            let Some((line, text)) = self.lines.as_mut().and_then(Iterator::next) else { return Err(self.ends()) };
+            self.line = line;
+            self.words.extend(words(text));
+            self.words.reverse();
+        }
+        Ok(self.words.pop().unwrap_or_default())
+    }
+
     /// The next number, stored as `kind`.
     fn next(&mut self, kind: Kind) -> Result<f64, InputError> {
         if self.format == Format::Text {
-            while self.words.is_empty() {
-                let Some((line, text)) = self.lines.as_mut().and_then(Iterator::next) else { return Err(self.ends()) };
-                self.line = line;
-                self.words.extend(words(text));
-                self.words.reverse();
-            }
-            let word = self.words.pop().unwrap_or_default();
+            let word = self.word()?;
             return number(word).ok_or_else(|| fault(self.place(), not_a_number(word)).expected("a number").into());
         }
         let is_big = self.format == Format::BigEndian;
@@ -248,31 +283,40 @@ impl Body<'_> {
         })
     }
 
+    /// How many numbers `property` has in the next entry.
+    fn length(&mut self, property: &Property) -> Result<usize, InputError> {
+        let Some(count) = property.count else { return Ok(1) };
+        let count = self.next(count)?;
+        if !(count >= 0.0 && count.fract() == 0.0 && count <= self.bytes.len() as f64) {
+            let problem = format!("a list \"{}\" has {count:e} entries", property.name);
+            return Err(fault(self.place(), problem).expected("a count that fits the file").into());
+        }
+        Ok(count as usize)
+    }
+
     /// The numbers of `property` of one entry.
     fn values(&mut self, property: &Property, values: &mut Vec<f64>) -> Result<(), InputError> {
         values.clear();
-        let Some(count) = property.count else {
+        for _ in 0..self.length(property)? {
             values.push(self.next(property.kind)?);
-            return Ok(());
-        };
-        let count = self.next(count)?;
-        if !(count >= 0.0 && count.fract() == 0.0 && count <= self.bytes.len() as f64) {
-            let problem = format!("a list \"{}\" has {count} entries", property.name);
-            return Err(fault(self.place(), problem).expected("a count that fits the file").into());
         }
-        for _ in 0..count as usize {
-            values.push(self.next(property.kind)?);
+        Ok(())
+    }
+
+    /// Steps over `property` of one entry; in a text body its words may be anything.
+    fn pass_over(&mut self, property: &Property) -> Result<(), InputError> {
+        for _ in 0..self.length(property)? {
+            if self.format == Format::Text {
+                self.word()?;
+            } else {
+                self.next(property.kind)?;
+            }
         }
         Ok(())
     }
 }
 
-fn read_vertices(
-    element: &Element,
-    body: &mut Body,
-    vertices: &mut Vec<Point>,
-    faults: &mut Faults,
-) -> Result<(), InputError> {
+fn read_vertices(element: &Element, body: &mut Body, vertices: &mut Vec<Point>) -> Result<(), InputError> {
     if element.count > 3 * MAX_TRIANGLES {
         return Err(too_many(body.path, element.count));
     }
@@ -281,18 +325,13 @@ fn read_vertices(
         let error = fault(Place::line(body.path, element.line), "vertices have no x, y and z");
         return Err(error.expected("properties x, y and z of element vertex").into());
     };
-    let mut values = Vec::new();
-    for index in 0..element.count {
+    for _ in 0..element.count {
         let mut point = Point::origin();
         for (k, property) in element.properties.iter().enumerate() {
-            body.values(property, &mut values)?;
-            for (axis, _) in [x, y, z].iter().enumerate().filter(|(_, at)| **at == k) {
-                point[axis] = values[0];
+            match [x, y, z].iter().position(|at| *at == k) {
+                Some(axis) => point[axis] = body.next(property.kind)?,
+                None => body.pass_over(property)?,
             }
-        }
-        if point.iter().any(|value| !value.is_finite()) {
-            let problem = format!("vertex {index} has the coordinates {}, {}, {}", point.x, point.y, point.z);
-            faults.push(Diagnostic::new("M203", body.place(), problem).expected("finite numbers"));
         }
         vertices.push(point);
     }
@@ -304,6 +343,7 @@ fn read_faces(
     body: &mut Body,
     vertices: &[Point],
     triangles: &mut Vec<[u32; 3]>,
+    cutter: &mut Cutter,
     faults: &mut Faults,
 ) -> Result<(), InputError> {
     let Some(corners) = element.index(&["vertex_indices", "vertex_index"], true) else {
@@ -314,10 +354,11 @@ fn read_faces(
     for index in 0..element.count {
         face.clear();
         for (k, property) in element.properties.iter().enumerate() {
-            body.values(property, &mut values)?;
             if k != corners {
+                body.pass_over(property)?;
                 continue;
             }
+            body.values(property, &mut values)?;
             if values.len() < 3 {
                 let problem = format!("face {index} has {} corners", values.len());
                 faults.push(fault(body.place(), problem).expected("at least three"));
@@ -339,7 +380,7 @@ fn read_faces(
         if triangles.len() + face.len() - 2 > MAX_TRIANGLES {
             return Err(too_many(body.path, triangles.len() + face.len() - 2));
         }
-        if faults.found.is_empty() && !triangulate(&face, vertices, triangles) {
+        if faults.found.is_empty() && !cutter.triangulate(&face, vertices, triangles) {
             let problem = format!("face {index} is concave and has {} corners", face.len());
             let expected = format!("at most {MAX_CONCAVE} where it is not convex");
             faults.push(fault(body.place(), problem).expected(expected));

@@ -6,8 +6,25 @@ use nalgebra::Vector2;
 /// Most corners of a polygon that is not convex; ear clipping is quadratic at best.
 pub(super) const MAX_CONCAVE: usize = 2_000;
 
-/// Appends the triangles of the polygon `face`, wound like it; false when it is concave and too large.
-pub(super) fn triangulate(face: &[u32], vertices: &[Point], triangles: &mut Vec<[u32; 3]>) -> bool {
+/// Comparisons of a corner with an ear for all polygons of a file: a second or two. Polygons that cross themselves may need their number of
+/// corners to the third power.
+const MAX_COMPARED: u64 = 300_000_000;
+
+/// Cuts the polygons of one file.
+#[derive(Default)]
+pub(super) struct Cutter {
+    n_compared: u64,
+}
+
+impl Cutter {
+    /// Appends the triangles of the polygon `face`, wound like it; false when it is concave and too large, or when all such polygons together
+    /// are.
+    pub(super) fn triangulate(&mut self, face: &[u32], vertices: &[Point], triangles: &mut Vec<[u32; 3]>) -> bool {
+        triangulate(face, vertices, triangles, &mut self.n_compared)
+    }
+}
+
+fn triangulate(face: &[u32], vertices: &[Point], triangles: &mut Vec<[u32; 3]>, n_compared: &mut u64) -> bool {
     if let [a, b, c] = *face {
         triangles.push([a, b, c]);
         return true;
@@ -30,12 +47,18 @@ pub(super) fn triangulate(face: &[u32], vertices: &[Point], triangles: &mut Vec<
     }
     let mut left: Vec<usize> = (0..n).collect();
     while left.len() > 3 {
+        if *n_compared > MAX_COMPARED {
+            return false;
+        }
         let m = left.len();
+        let mut n_here = 0;
         let corner = |i: usize| [left[(i + m - 1) % m], left[i], left[(i + 1) % m]];
-        let is_ear = |i: &usize| {
+        let mut is_ear = |i: &usize| {
+            n_here += 1;
             let [a, b, c] = corner(*i);
             turn(a, b, c) > 0.0
                 && left.iter().all(|&p| {
+                    n_here += 1;
                     // Repeated positions, as bridges to holes have, do not block.
                     let apart = flat[p] != flat[a] && flat[p] != flat[b] && flat[p] != flat[c];
                     !(apart && turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0)
@@ -49,7 +72,8 @@ pub(super) fn triangulate(face: &[u32], vertices: &[Point], triangles: &mut Vec<
                 turn(a, b, c).abs().total_cmp(&turn(d, e, f).abs())
             })
         };
-        let Some(ear) = (0..m).find(is_ear).or_else(straightest) else { break };
+        let Some(ear) = (0..m).find(&mut is_ear).or_else(straightest) else { break };
+        *n_compared += n_here;
         let [a, b, c] = corner(ear);
         triangles.push([face[a], face[b], face[c]]);
         left.remove(ear);
