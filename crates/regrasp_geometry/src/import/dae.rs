@@ -4,7 +4,7 @@
 //! planning and are passed over.
 
 use super::placed::{Corners, Placed};
-use super::polygon::{Cutter, MAX_CONCAVE};
+use super::polygon::Cutter;
 use super::{MAX_TRIANGLES, check_encoding, not_a_number, shown, too_many};
 use crate::frame::{Point, Vector};
 use crate::mesh::TriangleMesh;
@@ -322,9 +322,8 @@ impl<'a, 'i> File<'a, 'i> {
             let inputs = self.inputs(primitive, scene)?;
             let mut indices = Vec::new();
             for face in self.corners(primitive, &inputs)? {
-                if !scene.cutter.triangulate(&face, &inputs.positions, &mut indices) {
+                if let Err(expected) = scene.cutter.triangulate(&face, &inputs.positions, &mut indices) {
                     let problem = format!("a concave polygon has {} corners", face.len());
-                    let expected = format!("at most {MAX_CONCAVE} where it is not convex");
                     return Err(self.fault(primitive, problem).expected(expected).into());
                 }
                 if triangles.len() + indices.len() > MAX_TRIANGLES {

@@ -19,9 +19,8 @@ const MAX_DEPTH: usize = 256;
 const JSON: u32 = 0x4E4F_534A;
 const BINARY: u32 = 0x004E_4942;
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Default)]
 #[serde(rename_all = "camelCase", default)]
-#[derive(Default)]
 struct Gltf {
     scene: Option<usize>,
     scenes: Vec<SceneEntry>,
@@ -51,6 +50,8 @@ struct NodeEntry {
     rotation: Option<[f64; 4]>,
     scale: Option<[f64; 3]>,
     skin: Option<usize>,
+    /// In place of those of its mesh.
+    weights: Option<Vec<f64>>,
     #[serde(default)]
     extensions: BTreeMap<String, serde::de::IgnoredAny>,
 }
@@ -215,10 +216,15 @@ impl<'a> File<'a> {
         let entry = self.entry(&self.gltf.nodes, node, "node")?;
         let file_from_node = above * self.transform(entry, node)?;
         if let Some(mesh) = entry.mesh {
-            let other = if entry.skin.is_some() { Some("a skin") } else { None };
-            if let Some(other) = other.or(entry.extensions.contains_key(INSTANCES).then_some(INSTANCES)) {
-                let error = self.fault(format!("node {node} places its mesh by {other}, which is not read here"));
-                return Err(error.expected("a mesh placed by its node").fix("export the mesh alone").into());
+            let weights = entry.weights.as_ref().unwrap_or(&self.entry(&self.gltf.meshes, mesh, "mesh")?.weights);
+            let others = [
+                (entry.skin.is_some(), "a skin"),
+                (entry.extensions.contains_key(INSTANCES), INSTANCES),
+                (weights.iter().any(|weight| *weight != 0.0), "weights of other shapes"),
+            ];
+            if let Some((_, other)) = others.into_iter().find(|(is_there, _)| *is_there) {
+                let error = self.fault(format!("node {node} changes its mesh by {other}, which is not read here"));
+                return Err(error.expected("a mesh placed by its node").fix("export the mesh as it looks").into());
             }
             let triangles = match placing.meshes.get(&mesh) {
                 Some(known) => known.clone(),
@@ -251,13 +257,7 @@ impl<'a> File<'a> {
     /// The triangles of a mesh, in its frame.
     fn mesh(&self, mesh: usize, known: &mut BTreeMap<usize, Arc<Vec<Point>>>) -> Result<Vec<Corners>, InputError> {
         let mut triangles: Vec<Corners> = Vec::new();
-        let entry = self.entry(&self.gltf.meshes, mesh, "mesh")?;
-        if entry.weights.iter().any(|weight| *weight != 0.0) {
-            let error =
-                self.fault(format!("mesh {mesh} is drawn towards other shapes (weights), which are not read here"));
-            return Err(error.expected("weights of 0, or none").fix("export the mesh as it looks").into());
-        }
-        for primitive in &entry.primitives {
+        for primitive in &self.entry(&self.gltf.meshes, mesh, "mesh")?.primitives {
             let mode = primitive.mode.unwrap_or(4);
             // Points and lines have no surface.
             if mode < 4 {

@@ -1,6 +1,6 @@
 //! Wavefront OBJ: vertices and faces. Everything else, materials included, has no part in planning and is skipped.
 
-use super::polygon::{Cutter, MAX_CONCAVE};
+use super::polygon::Cutter;
 use super::{Faults, MAX_TRIANGLES, TextLines, check_encoding, coordinates, shown, too_many, words};
 use crate::frame::Point;
 use crate::mesh::TriangleMesh;
@@ -70,9 +70,11 @@ pub fn read_obj(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
                 }
             }
         }
-        if face.len() == end - start && !cutter.triangulate(&face, &vertices, &mut triangles) {
+        if face.len() == end - start
+            && let Err(expected) = cutter.triangulate(&face, &vertices, &mut triangles)
+        {
             let problem = format!("a concave face has {} corners", face.len());
-            faults.at_line("M240", line, problem, &format!("at most {MAX_CONCAVE} where it is not convex"));
+            faults.at_line("M240", line, problem, &expected);
         }
         start = end;
     }

@@ -422,6 +422,7 @@ fn every_dialect_of_binary_gltf_gives_the_tetrahedron() {
     assert_eq!(with(r#""mesh": 0"#, r#""mesh": 0, "skin": 0"#), refused);
     assert_eq!(with(r#""mesh": 0"#, r#""mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}"#), refused);
     assert_eq!(with(r#""primitives""#, r#""weights": [0.5], "primitives""#), refused);
+    assert_eq!(with(r#""mesh": 0"#, r#""mesh": 0, "weights": [0.5]"#), refused);
     assert_eq!(with(r#""byteStride": 16"#, r#""byteStride": 8"#), refused);
     assert_eq!(with(r#""byteOffset": 68"#, r#""byteOffset": 18446744073709551615"#), refused);
     assert_eq!(with(r#""type": "SCALAR""#, r#""type": "VEC2""#), refused);

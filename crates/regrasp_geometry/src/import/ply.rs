@@ -1,6 +1,6 @@
 //! PLY (Stanford polygon format), text and binary. Vertices and faces are read; colours, normals and other elements are passed over.
 
-use super::polygon::{Cutter, MAX_CONCAVE};
+use super::polygon::Cutter;
 use super::{Faults, MAX_TRIANGLES, TextLines, check_encoding, not_a_number, number, shown, too_many, words};
 use crate::frame::Point;
 use crate::mesh::TriangleMesh;
@@ -380,9 +380,10 @@ fn read_faces(
         if triangles.len() + face.len() - 2 > MAX_TRIANGLES {
             return Err(too_many(body.path, triangles.len() + face.len() - 2));
         }
-        if faults.found.is_empty() && !cutter.triangulate(&face, vertices, triangles) {
+        if faults.found.is_empty()
+            && let Err(expected) = cutter.triangulate(&face, vertices, triangles)
+        {
             let problem = format!("face {index} is concave and has {} corners", face.len());
-            let expected = format!("at most {MAX_CONCAVE} where it is not convex");
             faults.push(fault(body.place(), problem).expected(expected));
         }
     }

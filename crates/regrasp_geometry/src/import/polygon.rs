@@ -4,7 +4,7 @@ use crate::frame::Point;
 use nalgebra::Vector2;
 
 /// Most corners of a polygon that is not convex; ear clipping is quadratic at best.
-pub(super) const MAX_CONCAVE: usize = 2_000;
+const MAX_CONCAVE: usize = 2_000;
 
 /// Comparisons of a corner with an ear for all polygons of a file: a second or two. Polygons that cross themselves may need their number of
 /// corners to the third power.
@@ -17,10 +17,20 @@ pub(super) struct Cutter {
 }
 
 impl Cutter {
-    /// Appends the triangles of the polygon `face`, wound like it; false when it is concave and too large, or when all such polygons together
-    /// are.
-    pub(super) fn triangulate(&mut self, face: &[u32], vertices: &[Point], triangles: &mut Vec<[u32; 3]>) -> bool {
-        triangulate(face, vertices, triangles, &mut self.n_compared)
+    /// Appends the triangles of the polygon `face`, wound like it.
+    ///
+    /// Errors: it is concave and too large, or all such polygons together are; what was expected of it.
+    pub(super) fn triangulate(
+        &mut self,
+        face: &[u32],
+        vertices: &[Point],
+        triangles: &mut Vec<[u32; 3]>,
+    ) -> Result<(), String> {
+        match triangulate(face, vertices, triangles, &mut self.n_compared) {
+            true => Ok(()),
+            false if face.len() > MAX_CONCAVE => Err(format!("at most {MAX_CONCAVE} where it is not convex")),
+            false => Err("few polygons that are not convex, and none that crosses itself".into()),
+        }
     }
 }
 
