@@ -2,9 +2,9 @@
 
 /// Most XML nodes in a file; a limit for the parser.
 pub const MAX_NODES: u32 = 1_000_000;
-/// Deepest nesting of elements; URDF and SRDF need 6.
+/// Deepest nesting of elements; URDF and SRDF need 6, COLLADA some more for each node inside another.
 const MAX_DEPTH: usize = 64;
-/// Most attributes of an element; URDF needs 4. Parsers compare each with all others.
+/// Most attributes of an element; URDF and COLLADA need 4. Parsers compare each with all others.
 const MAX_ATTRIBUTES: usize = 256;
 /// Most declarations of name spaces in a file; parsers compare each with all others.
 const MAX_NAMESPACES: usize = 1_000;

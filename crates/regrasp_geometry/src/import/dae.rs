@@ -3,7 +3,7 @@
 //! The unit of the file scales lengths. Its up axis turns nothing, as in tools of ROS. Materials, normals and animations have no part in
 //! planning and are passed over.
 
-use super::placed::{Corners, Placed};
+use super::placed::{Corners, Placed, fan, strip};
 use super::polygon::Cutter;
 use super::{MAX_TRIANGLES, check_encoding, not_a_number, shown, too_many};
 use crate::frame::{Point, Vector};
@@ -359,9 +359,8 @@ impl<'a, 'i> File<'a, 'i> {
         let positions = match scene.positions.get(&start) {
             Some(known) => known.clone(),
             None => {
-                let inputs = children(vertices, "input");
-                let Some(position) = inputs.into_iter().find(|input| input.attribute("semantic") == Some("POSITION"))
-                else {
+                let mut inputs = children(vertices, "input");
+                let Some(position) = inputs.find(|input| input.attribute("semantic") == Some("POSITION")) else {
                     return Err(self.fault(vertices, "has no input POSITION").expected("one").into());
                 };
                 let positions = Arc::new(self.positions(self.target(position, "source", "source")?)?);
@@ -432,17 +431,8 @@ impl<'a, 'i> File<'a, 'i> {
         let mut faces: Vec<Vec<u32>> = Vec::new();
         match name {
             "triangles" => faces.extend(lists.iter().flat_map(|list| list.chunks_exact(3)).map(<[u32]>::to_vec)),
-            "trifans" => {
-                let fans =
-                    lists.iter().flat_map(|list| list.windows(2).skip(1).map(|pair| vec![list[0], pair[0], pair[1]]));
-                faces.extend(fans);
-            }
-            "tristrips" => {
-                for list in &lists {
-                    let strips = list.windows(3).enumerate();
-                    faces.extend(strips.map(|(k, c)| if k % 2 == 0 { c.to_vec() } else { vec![c[1], c[0], c[2]] }));
-                }
-            }
+            "trifans" => faces.extend(lists.iter().flat_map(|list| fan(list)).map(|face| face.to_vec())),
+            "tristrips" => faces.extend(lists.iter().flat_map(|list| strip(list)).map(|face| face.to_vec())),
             "polygons" => faces = lists,
             _ => {
                 let Some(counts) = children(primitive, "vcount").next() else {

@@ -1,7 +1,7 @@
-//! Binary glTF 2.0 (Khronos 2017): triangles of the scene, placed by its nodes. Materials, normals, skins and animations have no part in
-//! planning and are passed over.
+//! Binary glTF 2.0 (Khronos 2017): triangles of the scene, placed by its nodes. Materials, normals and animations have no part in planning
+//! and are passed over. What would move the surface in another way is refused.
 
-use super::placed::{Corners, Placed};
+use super::placed::{Corners, Placed, fan, strip};
 use super::{MAX_TRIANGLES, shown, too_many};
 use crate::frame::{Point, Vector};
 use crate::mesh::TriangleMesh;
@@ -103,7 +103,8 @@ struct Buffer {
 /// Reads a binary glTF file: the meshes of its scene, or all meshes where it has no scene. Axes are those of the file: y is up in most.
 ///
 /// Errors: M202 no triangles, M203 NaN or infinite coordinates, M220 too many triangles, M241 an index that names no vertex, M270 not as
-/// glTF says, or with what is not read here (compression, sparse accessors, other files).
+/// glTF says, or with what is not read here (skins, weights of other shapes, instances by an extension, compression, sparse accessors, other
+/// files).
 pub fn read_glb(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
     if bytes.is_empty() {
         return Err(Diagnostic::new("M202", Place::file(path), "is empty (0 bytes)").into());
@@ -294,12 +295,8 @@ impl<'a> File<'a> {
             }
             match mode {
                 4 => triangles.extend(corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]])),
-                5 => {
-                    let strip = corners.windows(3).enumerate();
-                    triangles
-                        .extend(strip.map(|(k, c)| if k % 2 == 0 { [c[0], c[1], c[2]] } else { [c[1], c[0], c[2]] }));
-                }
-                6 => triangles.extend(corners.windows(2).skip(1).map(|c| [corners[0], c[0], c[1]])),
+                5 => triangles.extend(strip(&corners)),
+                6 => triangles.extend(fan(&corners)),
                 _ => {
                     return Err(self.fault(format!("a part of mesh {mesh} has mode {mode}")).expected("0 to 6").into());
                 }

@@ -1,4 +1,4 @@
-//! Triangles of a scene whose parts are placed by matrices.
+//! Triangles of a scene whose parts are placed by matrices, and of strips and fans.
 
 use super::{Faults, MAX_TRIANGLES, too_many};
 use crate::frame::Point;
@@ -9,6 +9,16 @@ use std::path::Path;
 
 /// Corners of a triangle.
 pub(super) type Corners = [Point; 3];
+
+/// Triangles of a strip: each corner after the second makes one with the two before it, every other one turned.
+pub(super) fn strip<T: Copy>(corners: &[T]) -> impl Iterator<Item = [T; 3]> {
+    corners.windows(3).enumerate().map(|(k, c)| if k % 2 == 0 { [c[0], c[1], c[2]] } else { [c[1], c[0], c[2]] })
+}
+
+/// Triangles of a fan: each corner after the second makes one with the first and the one before it.
+pub(super) fn fan<T: Copy>(corners: &[T]) -> impl Iterator<Item = [T; 3]> {
+    corners.windows(2).skip(1).map(|c| [corners[0], c[0], c[1]])
+}
 
 /// Triangles in the frame of the file.
 pub(super) struct Placed<'a> {
