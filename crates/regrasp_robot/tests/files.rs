@@ -225,6 +225,45 @@ fn hostile_xml_is_refused() {
     assert!(load(&write(folder.path(), "hand.urdf", harmless)).is_ok());
 }
 
+/// Elements of Drake, whose prefix such files often do not declare, are passed over; what is wrong elsewhere has its place.
+#[test]
+fn prefixes_that_are_not_declared_are_passed_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |radius: &str| {
+        format!(
+            r#"<robot name="r"><drake:x/><link name="a"><collision><geometry><sphere radius="{radius}"/></geometry><drake:proximity_properties>
+<drake:mu_static value="1"/></drake:proximity_properties></collision></link><drake:collision_filter_group name="g" drake:rotor="2"/></robot>"#
+        )
+    };
+    let read = load(&write(folder.path(), "hand.urdf", text("0.01"))).unwrap();
+    let declared = text("0.01").replacen("<robot", "<robot xmlns:drake='http://drake.mit.edu'", 1);
+    let other = load(&write(folder.path(), "other.urdf", declared)).unwrap();
+    assert_eq!(format!("{:?}", read.robot), format!("{:?}", other.robot));
+    assert_eq!(read.robot.links[0].collision.len(), 1);
+    let refused = load(&write(folder.path(), "hand.urdf", text("-1"))).unwrap_err().remove(0);
+    assert!(refused.contains("U151") && refused.contains("hand.urdf:1:71"), "{refused}");
+}
+
+#[test]
+fn xacro_files_are_known_by_their_content() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = r#"<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="root"/></robot>"#;
+    // Already expanded: the ending alone means nothing.
+    let path = write(folder.path(), "hand.urdf.xacro", plain);
+    assert_eq!(load(&path).unwrap().robot.links.len(), 1);
+    for text in [
+        plain.replace("<link name=\"root\"/>", "<link name=\"root\"/><xacro:macro name=\"m\"/>"),
+        // The prefix is not declared.
+        "<robot name='r'><xacro:macro name='m'/></robot>".to_owned(),
+    ] {
+        fs::write(&path, text).unwrap();
+        let refused = load(&path).unwrap_err().remove(0);
+        let command = format!("xacro {} -o {}", path.display(), folder.path().join("hand.urdf").display());
+        assert!(refused.starts_with("U107") && refused.contains("<xacro:macro>"), "{refused}");
+        assert!(refused.ends_with(&command), "{refused}");
+    }
+}
+
 #[test]
 fn what_is_defaulted_or_normalised_is_noted() {
     let folder = tempfile::tempdir().unwrap();

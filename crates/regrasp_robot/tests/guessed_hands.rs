@@ -243,27 +243,28 @@ fn a_hand_file_without_a_urdf_is_told_the_one_beside_it() {
     assert_eq!(error.diagnostics[0].fix, "add urdf = \"left.urdf\"");
 }
 
+/// A coupling that the follower's limits contradict is refused where no position is left, and told where hardly any is.
 #[test]
-fn xacro_files_are_known_by_their_content() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("hand.urdf.xacro");
-    let plain = format!(
-        r#"<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="root"/>{}</robot>"#,
-        finger("i", "root")
+fn leaders_that_can_hardly_move_are_told() {
+    let coupled = |offset: f64| {
+        let mimic =
+            format!(r#"<joint name="i_high" type="revolute"><mimic joint="i_low" multiplier="1" offset="{offset}"/>"#);
+        let parts = [finger("i", "root"), finger("m", "root")].concat();
+        guess(&parts.replace(r#"<joint name="i_high" type="revolute">"#, &mimic), None)
+    };
+    let stuck =
+        |loaded: LoadedHand| loaded.notes.iter().filter(|note| note.contains("can move only")).cloned().collect();
+    let told: Vec<String> = stuck(coupled(-2.0).unwrap());
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(
+        told[0].starts_with(
+            "joint \"i_low\" can move only from 1 to 1, of -1..1: the limits of what follows it (\"i_high\")"
+        ),
+        "{told:?}"
     );
-    // Already expanded: the ending alone means nothing.
-    fs::write(&path, &plain).unwrap();
-    assert_eq!(load_hand(&path, &LoadOptions::default()).unwrap().hand.fingers.len(), 1);
-    for (text, code) in [
-        (plain.replace("<link name=\"root\"/>", "<link name=\"root\"/><xacro:macro name=\"m\"/>"), "U107"),
-        // The prefix is not declared.
-        ("<robot name='r'><xacro:macro name='m'/></robot>".to_owned(), "U100"),
-    ] {
-        fs::write(&path, text).unwrap();
-        let diagnostic = load_hand(&path, &LoadOptions::default()).unwrap_err().diagnostics.remove(0);
-        let command = format!("xacro {} -o {}", path.display(), folder.path().join("hand.urdf").display());
-        assert_eq!((diagnostic.code, diagnostic.fix.ends_with(&command)), (code, true), "{diagnostic}");
-    }
+    assert_eq!(stuck(coupled(-1.0).unwrap()), Vec::<String>::new());
+    let refused = coupled(-2.5).unwrap_err().concat();
+    assert!(refused.contains("U143") && refused.contains("without <mimic> it moves by itself"), "{refused}");
 }
 
 #[test]

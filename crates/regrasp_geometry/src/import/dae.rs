@@ -10,7 +10,7 @@ use crate::frame::{Point, Vector};
 use crate::mesh::TriangleMesh;
 use nalgebra::{Matrix3, Matrix4, Rotation3, Unit};
 use regrasp_base::diagnostic::Lines;
-use regrasp_base::markup::{Hostile, MAX_NODES, refuse_hostile};
+use regrasp_base::markup::{Hostile, MAX_NODES, refuse_hostile, without_undeclared_prefixes};
 use regrasp_base::{Diagnostic, InputError, Place};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::BTreeMap;
@@ -38,7 +38,7 @@ pub fn read_dae(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
     let text = std::str::from_utf8(bytes).map_err(|_| {
         InputError::from(Diagnostic::new("M204", Place::file(path), "is not UTF-8 text").expected("UTF-8"))
     })?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let text = &without_undeclared_prefixes(text.strip_prefix('\u{feff}').unwrap_or(text));
     let fault = |place: Place, problem: String| InputError::from(Diagnostic::new("M260", place, problem));
     refuse_hostile(text).map_err(|hostile| match hostile {
         Hostile::Doctype { offset } => {

@@ -8,6 +8,7 @@ use regrasp_geometry::{Point, Pose, UnitVector, Vector};
 use regrasp_grasp::Contact;
 use regrasp_robot::kinematics::finger_ik::Coordinates;
 use regrasp_robot::tip::CurvedTip;
+use std::cell::Cell;
 
 /// Gaps below this touch, in metres.
 const TOUCHES: f64 = 1e-8;
@@ -45,6 +46,18 @@ pub struct Gap {
 
 /// How far the tip of `finger` is from the object.
 pub fn gap(model: &Model, finger: usize, hand_from_object: &Pose, joints: &[f64]) -> Gap {
+    gap_from(model, finger, hand_from_object, joints, None)
+}
+
+/// The same, looked for around the normal of the object where the tip was nearest a little before: a long tip with flat sides is seldom
+/// nearest where its centre is.
+fn gap_from(
+    model: &Model,
+    finger: usize,
+    hand_from_object: &Pose,
+    joints: &[f64],
+    normal_before: Option<Vector>,
+) -> Gap {
     let surface = &model.view.object.surface;
     let of_hand = &model.fingers[finger];
     let center = hand_from_object.inverse_transform_point(&of_hand.ik.tip(joints));
@@ -59,7 +72,8 @@ pub fn gap(model: &Model, finger: usize, hand_from_object: &Pose, joints: &[f64]
             let arm = |normal: &Vector| {
                 hand_from_object.inverse_transform_vector(&of_hand.arm_with(joints, &(hand_from_object * normal)))
             };
-            nearest(surface, &center, arm, least_radius(&tip), normal).unwrap_or(rough)
+            let from = |normal: Vector| nearest(surface, &center, arm, least_radius(&tip), normal);
+            normal_before.and_then(from).or_else(|| from(normal)).unwrap_or(rough)
         }
         _ => rough,
     }
@@ -159,7 +173,12 @@ pub fn touch_on_way(
         // At the grasp itself the joints are those that are given, to the last bit.
         if share == 1.0 { closed.clone() } else { (0..change.len()).map(position).collect() }
     };
-    let gap_at = |share: f64| gap(model, finger, hand_from_object, &at(share));
+    let normal_before = Cell::new(None);
+    let gap_at = |share: f64| {
+        let gap = gap_from(model, finger, hand_from_object, &at(share), normal_before.get());
+        normal_before.set(gap.is_exact.then_some(gap.normal));
+        gap
+    };
     let touching = |share: f64, gap: &Gap| {
         let joints = at(share);
         contact(model, finger, hand_from_object, &joints, gap).map(|contact| (contact, joints))
@@ -215,7 +234,46 @@ pub fn first_touch([mut outside, mut inside]: [f64; 2], distance: impl Fn(f64) -
 
 #[cfg(test)]
 mod tests {
-    use super::first_touch;
+    use super::{first_touch, least_radius, nearest};
+    use regrasp_base::Rng;
+    use regrasp_geometry::hull::ConvexHull;
+    use regrasp_geometry::{Point, Shape, Surface, Vector};
+    use regrasp_robot::tip::CurvedTip;
+    use regrasp_robot::tip::smooth_hull::SmoothHull;
+
+    /// A long, flat tip goes past a ball and over its end: from where it was nearest before, its nearest point is found all along, on faces, edges
+    /// and corners. The distance from a ball is the largest, over all directions, of that between planes across the direction.
+    #[test]
+    fn a_long_tip_is_followed_past_a_ball() {
+        let half = Vector::new(0.08, 0.01, 0.006);
+        let corner = |k: usize| half.map_with_location(|i, _, x| if k >> i & 1 == 1 { x } else { -x });
+        let corners: Vec<Point> = (0..8).map(|k| Point::from(corner(k))).collect();
+        let (hull, _) = SmoothHull::near(&ConvexHull::new(&corners).unwrap(), None).unwrap();
+        let tip = CurvedTip::Smooth(&hull);
+        let radius = 0.03;
+        let ball = Surface::of(&Shape::Sphere { radius }).unwrap();
+        let mut rng = Rng::keyed(1, "long_tip", 0);
+        let directions: Vec<Vector> = (0..20_000).map(|_| Vector::from(rng.direction())).collect();
+        let (mut before, mut n_known) = (None, 0);
+        let n_places = 200;
+        for k in 0..n_places {
+            let share = f64::from(k) / f64::from(n_places - 1);
+            let center = Point::new(-0.12 + 0.24 * share, 0.004 + 0.02 * share, 0.045 - 0.006 * share);
+            let from = |normal| nearest(&ball, &center, |n| tip.arm(&-n), least_radius(&tip), normal);
+            let straight = center.coords.normalize();
+            let Some(gap) = before.and_then(from).or_else(|| from(straight)) else {
+                before = None;
+                continue;
+            };
+            before = Some(gap.normal);
+            n_known += 1;
+            let between = |n: &Vector| n.dot(&center.coords) - hull.support(&-n) - radius;
+            let largest = directions.iter().map(&between).fold(f64::NEG_INFINITY, f64::max);
+            assert!((between(&gap.normal) - gap.distance).abs() < 1e-9, "{k}");
+            assert!(largest < gap.distance + 1e-9 && largest > gap.distance - 2e-3, "{k}: {largest} {}", gap.distance);
+        }
+        assert!(n_known >= n_places - 2, "{n_known}");
+    }
 
     #[test]
     fn roots_are_found_whatever_the_shape() {

@@ -4,7 +4,7 @@
 //! joint moves is palm, links above the base too where no arm carries the hand; moving joints that belong to no finger
 //! are held at the position nearest to zero.
 
-use super::chain::{ChainOwner, make_chain, middle_of_limits, rest_posture};
+use super::chain::{ChainOwner, make_chain, middle_of_limits, remarks_on_stuck_leaders, rest_posture};
 use super::fixes;
 use super::hull_tip::HullTips;
 use super::hulls::Hulls;
@@ -48,6 +48,7 @@ pub(crate) fn assemble(robot: &Arc<Robot>, spec: &HandSpec, file: &Path) -> Resu
     for (index, (finger, joints)) in spec.fingers.iter().zip(&moving).enumerate() {
         fingers.extend(make_finger(robot, index, finger, joints, &carried, (&mut hulls, &mut hull_tips), &mut found));
     }
+    notes.extend(fingers.iter().flat_map(|finger| remarks_on_stuck_leaders(robot, &finger.chain)));
     // An arm that carries the hand moves, and is no part of it.
     let above = match spec.mount {
         Some(_) => BTreeMap::new(),

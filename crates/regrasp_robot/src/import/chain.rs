@@ -7,7 +7,7 @@ use crate::hand::MAX_FINGER_JOINTS;
 use crate::kinematics::chain::{Chain, ChainJoint, JointMotion};
 use crate::kinematics::finger_ik::MAX_COORDINATES;
 use crate::kinematics::motion_bound::MAX_JOINTS;
-use crate::robot::{JointId, JointKind, LinkId, Robot};
+use crate::robot::{Joint, JointId, JointKind, LinkId, Robot};
 use regrasp_base::diagnostic::{Diagnostics, did_you_mean, number};
 use regrasp_base::{Diagnostic, Place};
 use std::collections::BTreeMap;
@@ -103,12 +103,46 @@ pub(super) fn make_chain(
             found.push(
                 Diagnostic::new("U143", owner.place.clone(), problem)
                     .element(owner.kind, owner.name)
-                    .expected("limits that overlap"),
+                    .expected("limits that overlap")
+                    .fix("correct multiplier or offset of the joints that follow it, or their limits"),
             );
             complete = false;
         }
     }
     complete.then(|| Chain::new(chain_joints, names, lower, upper).with_linear_limits(linear))
+}
+
+/// Least share of its own range that followers leave a joint which can be meant.
+const LEAST_LEFT: f64 = 0.02;
+
+/// What to say of joints of `chain` that can hardly move, for the limits of the joints that follow them: often the sign of a coupling is
+/// wrong.
+pub(super) fn remarks_on_stuck_leaders(robot: &Robot, chain: &Chain) -> Vec<String> {
+    let of_coordinate = |k: usize| {
+        let name = &chain.names[k];
+        let (id, joint) = robot.joints.iter().enumerate().find(|(_, joint)| joint.name == *name)?;
+        let own = joint.limits?;
+        let (range, left) = (own.upper - own.lower, chain.upper[k] - chain.lower[k]);
+        if !(range > 0.0) || left >= LEAST_LEFT * range {
+            return None;
+        }
+        let follows = |other: &&Joint| {
+            let single = other.coupling.as_ref().and_then(Coupling::single);
+            other.limits.is_some() && single.is_some_and(|(leader, _)| leader == JointId(id))
+        };
+        let followers: Vec<String> =
+            robot.joints.iter().filter(follows).map(|other| format!("\"{}\"", other.name)).collect();
+        Some(format!(
+            "joint \"{name}\" can move only from {} to {}, of {}..{}: the limits of what follows it ({}) leave no more. \
+             Correct multiplier or offset there, or the limits",
+            number(chain.lower[k]),
+            number(chain.upper[k]),
+            number(own.lower),
+            number(own.upper),
+            followers.join(", "),
+        ))
+    };
+    (0..chain.n_coordinates()).filter_map(of_coordinate).collect()
 }
 
 /// The middle of the limits; 0 for coordinates without limits.

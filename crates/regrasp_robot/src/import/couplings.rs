@@ -51,7 +51,9 @@ pub(super) fn read(entry: &Entry, robot: &mut Robot, found: &mut Found) {
     for (joint, place) in &added {
         let follower = &robot.joints[joint.0];
         if let Err(problem) = refuse_empty_range(&robot.joints, follower) {
-            refuse(place, "U143", format!("joint \"{}\" {problem}", follower.name), "ranges that overlap", found);
+            let problem = format!("joint \"{}\" {problem}", follower.name);
+            let diagnostic = place.error("U143", found, problem).expected("ranges that overlap");
+            found.diagnostics.push(diagnostic.fix("correct multiplier or offset of the coupling, or the limits"));
         }
     }
 }

@@ -7,6 +7,8 @@ use std::path::Path;
 
 /// Words in the address of xacro's name space; it has had several addresses.
 const XACRO: &str = "xacro";
+/// How names of it begin where it is not declared, once read.
+const UNDECLARED: &str = "xacro.";
 
 /// What is wrong with the file around `root`, where that is no URDF but a form that another tool turns into one.
 ///
@@ -24,6 +26,7 @@ pub(super) fn recognised(file: &Path, lines: &Lines, root: Node) -> Option<Diagn
     }
     let unexpanded = root.descendants().filter(Node::is_element).find(|node| is_xacro(node) || has_expression(node))?;
     let tag = unexpanded.tag_name().name();
+    let tag = tag.strip_prefix(UNDECLARED).unwrap_or(tag);
     let seen = match is_xacro(&unexpanded) {
         true => format!("it has <xacro:{tag}>"),
         false => format!("<{tag}> has an expression in ${{}} or $()"),
@@ -53,7 +56,8 @@ pub(super) fn is_xacro_name(path: &Path) -> bool {
 }
 
 fn is_xacro(node: &Node) -> bool {
-    node.tag_name().namespace().is_some_and(|address| address.contains(XACRO))
+    let tag = node.tag_name();
+    tag.namespace().is_some_and(|address| address.contains(XACRO)) || tag.name().starts_with(UNDECLARED)
 }
 
 /// `${...}` and `$(...)`, which mean nothing in a URDF.

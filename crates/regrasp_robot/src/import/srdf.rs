@@ -4,6 +4,7 @@ use super::options::{LoadOptions, LoadedInput};
 use super::xml::{Named, Reader, children, parse};
 use crate::robot::{JointId, LinkId, Robot};
 use regrasp_base::diagnostic::{Lines, did_you_mean};
+use regrasp_base::markup::without_undeclared_prefixes;
 use regrasp_base::{Diagnostic, InputError, files};
 use roxmltree::Node;
 use std::path::Path;
@@ -85,6 +86,7 @@ pub(crate) fn parse_srdf(
     robot: &Robot,
     lenient: bool,
 ) -> Result<(Srdf, Vec<String>), InputError> {
+    let text = &without_undeclared_prefixes(text);
     let document = parse(path, text)?;
     let root = document.root_element();
     // The joint between the robot and the world, of which the URDF knows nothing.

@@ -227,6 +227,7 @@ refused!(
 <mimic joint="lead" offset="5"/></joint>
 </robot>"#,
     [
-        r#"U143 hand.urdf:4:1 joint "follow": follows joint "lead" to 4..6, outside its own limits -1..1; expected ranges that overlap"#
+        r#"U143 hand.urdf:4:1 joint "follow": follows joint "lead" to 4..6, outside its own limits -1..1; expected ranges that overlap
+  fix: correct multiplier or offset of its <mimic>, or its limits; without <mimic> it moves by itself"#
     ]
 );

@@ -130,7 +130,10 @@ fn refuse_empty_ranges(reader: &mut Reader, joints: &[Joint], drafts: &[DraftJoi
         if let Err(problem) = refuse_empty_range(joints, follower) {
             let place = reader.place(draft.node);
             reader.found.push(
-                Diagnostic::new("U143", place, problem).element("joint", draft.name).expected("ranges that overlap"),
+                Diagnostic::new("U143", place, problem)
+                    .element("joint", draft.name)
+                    .expected("ranges that overlap")
+                    .fix("correct multiplier or offset of its <mimic>, or its limits; without <mimic> it moves by itself"),
             );
         }
     }

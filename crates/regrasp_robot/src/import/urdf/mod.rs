@@ -19,6 +19,7 @@ use super::resolve::Hints;
 use super::xml::{Reader, children, parse};
 use crate::robot::{Link, Robot};
 use regrasp_base::diagnostic::{Lines, bad_name};
+use regrasp_base::markup::without_undeclared_prefixes;
 use regrasp_base::{Diagnostic, InputError, files};
 use regrasp_geometry::TriangleMesh;
 use regrasp_geometry::import::{MAX_TRIANGLES, too_many};
@@ -74,6 +75,7 @@ fn parse_robot(
     (lenient, from_visuals): (bool, &BTreeSet<String>),
     meshes: &mut Meshes,
 ) -> Result<(Robot, Vec<String>), InputError> {
+    let text = &without_undeclared_prefixes(text);
     let document = parse(path, text)?;
     let root = document.root_element();
     let lines = Lines::of(text);
