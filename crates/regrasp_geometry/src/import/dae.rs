@@ -82,16 +82,20 @@ pub fn read_dae(path: &Path, bytes: &[u8]) -> Result<TriangleMesh, InputError> {
 }
 
 fn ids<'a, 'i>(root: Node<'a, 'i>) -> Ids<'a, 'i> {
-    let named = root.descendants().filter_map(|node| Some(((node.tag_name().name(), node.attribute("id")?), node)));
     let mut ids = BTreeMap::new();
-    for (name, node) in named {
-        ids.entry(name).or_insert(node);
+    for node in root.descendants() {
+        let Some(id) = node.attribute("id") else { continue };
+        let mesh = node.parent().filter(|parent| parent.has_tag_name_of("mesh")).map(|mesh| mesh.range().start);
+        for scope in [mesh, None] {
+            ids.entry((scope, node.tag_name().name(), id)).or_insert(node);
+        }
     }
     ids
 }
 
-/// Elements by their tags and ids: files of some exporters have one id for elements of several kinds.
-type Ids<'a, 'i> = BTreeMap<(&'a str, &'a str), Node<'a, 'i>>;
+/// Elements by their tags and ids: files of some exporters have one id for elements of several kinds. Those of a mesh stand under its
+/// place, too: in files that were put together, meshes have the same ids.
+type Ids<'a, 'i> = BTreeMap<(Option<usize>, &'a str, &'a str), Node<'a, 'i>>;
 
 fn children<'a, 'i: 'a>(node: Node<'a, 'i>, name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
     node.children().filter(move |child| child.has_tag_name_of(name))
@@ -152,10 +156,12 @@ impl<'a, 'i> File<'a, 'i> {
         Diagnostic::new("M260", self.lines.place(self.path, node.range().start), problem)
     }
 
-    /// The element called `tag` that attribute `name` of `node` points to.
+    /// The element called `tag` that attribute `name` of `node` points to: one of the same mesh, where there is one.
     fn target(&self, node: Node<'a, '_>, name: &str, tag: &'a str) -> Result<Node<'a, 'i>, InputError> {
         let url: &'a str = node.attribute(name).unwrap_or_default();
-        url.strip_prefix('#').and_then(|id| self.ids.get(&(tag, id))).copied().ok_or_else(|| {
+        let mesh = node.ancestors().find(|above| above.has_tag_name_of("mesh")).map(|mesh| mesh.range().start);
+        let found = |id| [mesh, None].into_iter().find_map(|scope| self.ids.get(&(scope, tag, id)));
+        url.strip_prefix('#').and_then(found).copied().ok_or_else(|| {
             let seen = shown(url.as_bytes());
             let problem = format!("<{}> points to <{tag}> \"{seen}\", which is not there", node.tag_name().name());
             self.fault(node, problem).expected("\"#ID\" of an element of this file").into()

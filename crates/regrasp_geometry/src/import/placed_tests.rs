@@ -243,6 +243,29 @@ fn every_dialect_of_collada_gives_the_tetrahedron() {
     is_the_tetrahedron("a.dae", bare.as_bytes(), 1.0);
 }
 
+/// Files that were put together have the same ids in several meshes: each reads its own.
+#[test]
+fn meshes_with_the_same_ids_read_their_own() {
+    let plain = dae("", &triangles(), NODE);
+    let bare = plain.replace(&plain[plain.find("<library_nodes>").unwrap()..plain.find("</COLLADA>").unwrap()], "");
+    let listed = |factor: f32| {
+        let corners: Vec<String> =
+            CORNERS.iter().map(|corner| corner.map(|x| (x * factor).to_string()).join(" ") + " 9").collect();
+        corners.join(" ")
+    };
+    let larger = bare.replace(&listed(1.0), &listed(3.0));
+    assert_ne!(larger, bare);
+    let geometry = &larger[larger.find("<geometry").unwrap()..larger.find("</library_geometries>").unwrap()];
+    let both = bare.replace("</library_geometries>", &format!("{geometry}</library_geometries>"));
+    let read_corners = |text: &str| corners(&read("a.dae", text.as_bytes()).unwrap());
+    let mut expected = [read_corners(&bare), read_corners(&larger)].concat();
+    expected.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    let mut seen = read_corners(&both);
+    expected.dedup();
+    seen.dedup();
+    assert_eq!(seen, expected);
+}
+
 /// Where the corners of a mesh are, sorted.
 fn corners(mesh: &TriangleMesh) -> Vec<[f64; 3]> {
     let mut corners: Vec<[f64; 3]> =
