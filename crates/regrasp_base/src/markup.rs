@@ -57,10 +57,10 @@ pub fn refuse_hostile(text: &str) -> Result<(), Hostile> {
 /// `text`, with a dot for the colon in names whose prefix is declared nowhere: `<drake.member` for `<drake:member`. Parsers that know
 /// name spaces refuse such names, others read them, and files are written that have them. Every byte keeps its place.
 pub fn without_undeclared_prefixes(text: &str) -> Cow<'_, str> {
-    let tags = || Pieces { text, at: 0 }.filter(|piece| matches!(piece.kind, Kind::Opening | Kind::Closing));
+    let tags = Pieces { text, at: 0 }.filter(|piece| matches!(piece.kind, Kind::Opening | Kind::Closing));
     let mut declared: BTreeSet<&str> = ["xml", "xmlns"].into();
     let mut prefixed = Vec::new();
-    for tag in tags() {
+    for tag in tags {
         let Some(end) = tag.end else { break };
         for name in names(text, tag.open, end) {
             let Some((prefix, local)) = text[name.clone()].split_once(':') else { continue };
