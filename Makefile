@@ -74,9 +74,11 @@ python:
 	  PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(VENV)/bin/pip install -q --no-build-isolation --no-deps . ; \
 	fi
 
+# A test on each core, four at most: some search on several threads themselves.
+PYTEST_WORKERS := -n auto --maxprocesses 4 --dist worksteal
 test-python: release python
 	if [ ! -d $(VENV) ]; then echo "SKIPPED: tests of the Python package"; \
-	else REGRASP_CLI=$(CURDIR)/$(REGRASP) $(VENV)/bin/python -m pytest -q; fi
+	else REGRASP_CLI=$(CURDIR)/$(REGRASP) $(VENV)/bin/python -m pytest -q $(PYTEST_WORKERS); fi
 
 # Data sets on Ray, in an environment that has it: `pip install ray`. Says SKIPPED where Ray is absent.
 test-ray:
