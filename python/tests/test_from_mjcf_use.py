@@ -50,6 +50,20 @@ def test_names_that_are_wrong(tmp_path: Path):
         convert(tmp_path / "text.xml", tmp_path / "out")
 
 
+def test_a_part_of_a_model_names_the_files_that_include_it(tmp_path: Path):
+    (tmp_path / "parts").mkdir()
+    part = tmp_path / "parts" / "hand.xml"
+    part.write_text("<mujocoinclude/>")
+    (tmp_path / "pen.xml").write_text('<mujoco><include file="parts/hand.xml"/></mujoco>')
+    (tmp_path / "other.xml").write_text('<mujoco><include file="parts/left_hand.xml"/></mujoco>')
+    (tmp_path / "parts" / "all.xml").write_text('<mujocoinclude><include file="hand.xml"/></mujocoinclude>')
+    with pytest.raises(MjcfError, match=r"give the file that includes it, such as \.\./pen\.xml$"):
+        convert(part, tmp_path / "out")
+    (tmp_path / "pen.xml").unlink()
+    with pytest.raises(MjcfError, match="give the file that includes it$"):
+        convert(part, tmp_path / "out")
+
+
 def test_folders_of_others_are_left_alone(tmp_path: Path):
     (tmp_path / "model").mkdir()
     (tmp_path / "model" / "palm.stl").write_text("mine")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -48,7 +49,23 @@ def compiled(path: Path) -> MjModel:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         # MuJoCo's words: file, line and cause.
-        raise MjcfError(f"{path}: MuJoCo cannot read it: {error}") from error
+        said = f"{path}: MuJoCo cannot read it: {error}"
+        if "mujocoinclude" in str(error):
+            said += f"; it is a part of a model: give the file that includes it{_including(path)}"
+        raise MjcfError(said) from error
+
+
+def _including(part: Path) -> str:
+    """Which model files in the folder of `part`, and in the one above, include it, in words; nothing where none does."""
+    own = part.resolve().parent
+    included = re.compile(rf"<include\s+file\s*=\s*[\"'](?:[^\"']*/)?{re.escape(part.name)}[\"']")
+    found: list[str] = []
+    for folder in (own, own.parent):
+        for file in sorted(folder.glob("*.xml")):
+            text = file.read_text(errors="replace")
+            if included.search(text) and "<mujocoinclude" not in text:
+                found.append(os.path.relpath(file, own))
+    return ", such as " + " or ".join(found[:3]) if found else ""
 
 
 class _Reading:

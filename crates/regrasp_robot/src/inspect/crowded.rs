@@ -24,6 +24,15 @@ pub(crate) fn crowded_pairs(hand: &Hand) -> BTreeSet<(LinkId, LinkId)> {
     near_in(&touch, &touch.of_one_finger(), MOSTLY)
 }
 
+/// Pairs of links, smaller first, that are nearer than [`NEAR`] in every posture, but for those of the links of fingertips: hulls of a palm and of
+/// the first phalanges on it, often. A fingertip that is never free says that something else is wrong.
+pub(crate) fn stuck_pairs(hand: &Hand) -> BTreeSet<(LinkId, LinkId)> {
+    let touch = Touch::new(hand);
+    let is_tip = |link: LinkId| hand.fingers.iter().any(|finger| finger.tip.link == link);
+    let asked: Vec<bool> = touch.pairs.iter().map(|&(a, b)| !is_tip(a) && !is_tip(b)).collect();
+    near_in(&touch, &asked, 1.0)
+}
+
 /// Those of `pairs` that are nearer than [`NEAR`] in nearly all postures.
 pub(crate) fn inseparable_pairs(hand: &Hand, pairs: &BTreeSet<(LinkId, LinkId)>) -> BTreeSet<(LinkId, LinkId)> {
     if pairs.is_empty() {
@@ -59,6 +68,15 @@ pub(crate) fn crowded_note(robot: &Robot, pairs: &BTreeSet<(LinkId, LinkId)>) ->
     )
 }
 
+/// What is said of pairs that [`stuck_pairs`] found.
+pub(crate) fn stuck_note(robot: &Robot, pairs: &BTreeSet<(LinkId, LinkId)>) -> String {
+    format!(
+        "links that are within {} mm of each other in every posture are not tested against each other (`allow` in the hand file): {}",
+        1e3 * NEAR,
+        named(robot, pairs)
+    )
+}
+
 /// What is said of pairs that [`inseparable_pairs`] found.
 pub(crate) fn inseparable_note(robot: &Robot, pairs: &BTreeSet<(LinkId, LinkId)>) -> String {
     format!(
@@ -80,4 +98,63 @@ fn named(robot: &Robot, pairs: &BTreeSet<(LinkId, LinkId)>) -> String {
         n => format!(", and {n} more pairs"),
     };
     named + &others
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::import::{LoadOptions, LoadedHand, load_hand};
+    use crate::inspect::hand_file_text;
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    /// Two fingers of three links, 3 cm each, on a root with a plate at height `plate`, in metres.
+    fn urdf(plate: f64) -> String {
+        let finger = |name: &str, x: f64| -> String {
+            let of = |parent: &str, link: &str, x: f64, z: f64| {
+                format!(
+                    r#"<link name="{name}_{link}"><collision><origin xyz="0 0 0.015"/><geometry><capsule radius="0.005" length="0.03"/></geometry></collision></link>
+<joint name="{name}_{link}_joint" type="revolute"><parent link="{parent}"/><child link="{name}_{link}"/><origin xyz="{x} 0 {z}"/><axis xyz="0 1 0"/><limit lower="-0.4" upper="0.4"/></joint>
+"#
+                )
+            };
+            let [a, b] = ["a", "b"].map(|link| format!("{name}_{link}"));
+            of("root", "a", x, 0.0) + &of(&a, "b", 0.0, 0.03) + &of(&b, "c", 0.0, 0.03)
+        };
+        format!(
+            r#"<robot name="r"><link name="root"><collision><origin xyz="0 0 {plate}"/><geometry><box size="0.1 0.1 0.02"/></geometry></collision></link>{}{}</robot>"#,
+            finger("i", 0.03),
+            finger("t", -0.03)
+        )
+    }
+
+    fn read(folder: &Path, name: &str) -> LoadedHand {
+        load_hand(&folder.join(name), &LoadOptions::default()).unwrap()
+    }
+
+    /// A palm that reaches up into the second links: with these tested no finger has a posture.
+    #[test]
+    fn links_that_meet_in_every_posture_are_not_tested() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("hand.urdf"), urdf(0.03)).unwrap();
+        let loaded = read(folder.path(), "hand.urdf");
+        let hand = &loaded.hand;
+        for (a, b, may) in [("root", "i_b", true), ("root", "t_b", true), ("root", "i_c", false), ("i_b", "t_b", false)]
+        {
+            let [first, second] = [a, b].map(|name| hand.robot.link_named(name).unwrap());
+            assert_eq!(hand.may_touch(first, second), may, "{a} {b}");
+        }
+        let note = "links that are within 1 mm of each other in every posture are not tested";
+        let said: Vec<&String> = loaded.notes.iter().filter(|text| text.starts_with(note)).collect();
+        assert!(said.len() == 1 && said[0].ends_with(": \"root\" and \"i_b\", \"root\" and \"t_b\""), "{said:?}");
+
+        // The file that is written says so.
+        let text = hand_file_text(hand, "hand.urdf", &BTreeSet::new());
+        std::fs::write(folder.path().join("hand.toml"), text).unwrap();
+        let again = read(folder.path(), "hand.toml").hand;
+        assert_eq!((&again.allowed_pairs, again.fingers[0].rest.len()), (&hand.allowed_pairs, 3));
+
+        std::fs::write(folder.path().join("hand.urdf"), urdf(-0.02)).unwrap();
+        let apart = read(folder.path(), "hand.urdf");
+        assert!(!apart.notes.iter().any(|text| text.starts_with(note)), "{:?}", apart.notes);
+    }
 }

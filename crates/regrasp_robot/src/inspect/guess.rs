@@ -3,7 +3,7 @@
 //! A finger ends at a moving joint below which nothing moves. Its tip link is the one whose collision geometry reaches
 //! farthest from that joint.
 
-use super::crowded::{crowded_note, crowded_pairs};
+use super::crowded::{crowded_note, crowded_pairs, stuck_note, stuck_pairs};
 use super::enclosing::{enclosing_links, enclosing_note};
 use super::finger_names::{End, finger_names};
 use super::rigid::rigid_links;
@@ -75,15 +75,21 @@ pub(crate) fn guess_hand(robot: &Robot, options: &LoadOptions, file: &Path) -> R
 }
 
 /// Writes into `spec` what would keep the fingers of `hand`, which was made of it, from holding anything: volumes around the fingertips, and pairs
-/// of links of one finger that are always near each other. What is said of it.
+/// of links that are always near each other, of one finger mostly. What is said of it.
 pub(crate) fn leave_out_what_blocks(robot: &Robot, hand: &Hand, spec: &mut HandSpec) -> Vec<String> {
     spec.without_geometry = enclosing_links(hand);
     let mut notes: Vec<String> = spec.without_geometry.iter().map(|&link| enclosing_note(robot, link)).collect();
     let crowded = crowded_pairs(hand);
     if !crowded.is_empty() {
         notes.push(crowded_note(robot, &crowded));
-        spec.allow.extend(crowded);
     }
+    let is_left_out = |link: &LinkId| spec.without_geometry.contains(link);
+    let mut stuck = stuck_pairs(hand);
+    stuck.retain(|pair| !crowded.contains(pair) && ![pair.0, pair.1].iter().any(is_left_out));
+    if !stuck.is_empty() {
+        notes.push(stuck_note(robot, &stuck));
+    }
+    spec.allow.extend(crowded.into_iter().chain(stuck));
     notes
 }
 
