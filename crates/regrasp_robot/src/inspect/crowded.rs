@@ -115,6 +115,7 @@ fn named(robot: &Robot, pairs: &BTreeSet<(LinkId, LinkId)>) -> String {
 mod tests {
     use crate::import::{LoadOptions, LoadedHand, load_hand};
     use crate::inspect::hand_file_text;
+    use crate::inspect::touch::Touch;
     use std::collections::BTreeSet;
     use std::path::Path;
 
@@ -144,7 +145,7 @@ mod tests {
 
     /// A palm that reaches up into the second links: with these tested no finger has a posture.
     #[test]
-    fn links_that_meet_in_every_posture_are_not_tested() {
+    fn links_that_touch_in_every_posture_are_not_tested() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("hand.urdf"), urdf(0.03)).unwrap();
         let loaded = read(folder.path(), "hand.urdf");
@@ -158,16 +159,20 @@ mod tests {
         let said: Vec<&String> = loaded.notes.iter().filter(|text| text.starts_with(note)).collect();
         assert!(said.len() == 1 && said[0].ends_with(": \"root\" and \"i_b\", \"root\" and \"t_b\""), "{said:?}");
 
+        let rest: Vec<Vec<f64>> = hand.fingers.iter().map(|finger| finger.rest.clone()).collect();
+        assert!(!Touch::new(hand).touching(&rest).contains(&true), "{rest:?}");
+
         // The file that is written says so.
         let text = hand_file_text(hand, "hand.urdf", &BTreeSet::new());
         std::fs::write(folder.path().join("hand.toml"), text).unwrap();
-        let again = read(folder.path(), "hand.toml").hand;
-        assert_eq!((&again.allowed_pairs, again.fingers[0].rest.len()), (&hand.allowed_pairs, 3));
+        assert_eq!(read(folder.path(), "hand.toml").hand.allowed_pairs, hand.allowed_pairs);
 
-        // Half a millimetre below them at most, and inside them where the first links lean: in these postures fingers are in the way.
+        // A palm that ends half a millimetre below them at most, and that they meet where the first links lean; a palm far below.
         for plate in [0.0145, -0.02] {
             std::fs::write(folder.path().join("hand.urdf"), urdf(plate)).unwrap();
             let tested = read(folder.path(), "hand.urdf");
+            let [palm, second] = ["root", "i_b"].map(|name| tested.hand.robot.link_named(name).unwrap());
+            assert!(!tested.hand.may_touch(palm, second), "{plate}");
             assert!(!tested.notes.iter().any(|text| text.starts_with(note)), "{plate}: {:?}", tested.notes);
         }
     }
